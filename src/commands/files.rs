@@ -110,8 +110,8 @@ pub fn command_line() -> String {
     line_of(std::env::args_os().skip(1))
 }
 
-/// The command line with these arguments, quoted for a shell. An argument may be no Unicode text, such as the path of an
-/// old log: its invalid bytes are replaced.
+/// The command line with these arguments, quoted for a shell. An argument may be no Unicode text, such as the path of
+/// an old log: its invalid bytes are replaced.
 fn line_of(arguments: impl Iterator<Item = OsString>) -> String {
     arguments.fold("greylag".into(), |line, word| line + " " + &quoted(Path::new(&word)))
 }

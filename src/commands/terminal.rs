@@ -92,8 +92,8 @@ pub fn broken(text: &str) -> String {
     lines.join("\n")
 }
 
-/// Prints a line to standard output. An output that the reader has closed is ignored: `println!` would panic there, and a
-/// panic of the main thread ends the flight.
+/// Prints a line to standard output. An output that the reader has closed is ignored: `println!` would panic there,
+/// and a panic of the main thread ends the flight.
 pub fn say(line: Arguments<'_>) {
     let _ = writeln!(io::stdout(), "{line}");
 }

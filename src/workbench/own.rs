@@ -146,8 +146,8 @@ impl Bench {
     }
 }
 
-/// The flights that a comparison uses, in its order: those with a window. `slowest` is the airspeed at which flight begins,
-/// m/s.
+/// The flights that a comparison uses, in its order: those with a window. `slowest` is the airspeed at which flight
+/// begins, m/s.
 fn compared(flights: &[Reconstruction], slowest: f64) -> Result<Vec<Prepared>, ClockError> {
     let prepared = flights.iter().map(|f| Prepared::new(f, slowest));
     let mut prepared = prepared.collect::<Result<Vec<_>, _>>()?;

@@ -131,8 +131,8 @@ fn listed(drawn: &Drawn) -> Vec<String> {
     ]
 }
 
-/// Prints the quantiles of each trait and the values of the models `placed`. Then prints the traits in which a model lies
-/// outside the draws.
+/// Prints the quantiles of each trait and the values of the models `placed`. Then prints the traits in which a model
+/// lies outside the draws.
 fn print(characters: &[Character], placed: &[(GreyBox, Character)]) {
     let mut table = Table::new();
     table.load_style(NOTHING);

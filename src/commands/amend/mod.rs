@@ -161,8 +161,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// The reason why the fit is not written, in a sentence; `None` if it is written. With `--fit-all` no flight is held out,
-/// so an improvement by chance cannot be detected.
+/// The reason why the fit is not written, in a sentence; `None` if it is written. With `--fit-all` no flight is held
+/// out, so an improvement by chance cannot be detected.
 fn given_is_kept(arguments: &Arguments, story: &Amendment) -> Option<String> {
     let by_chance = || story.by_chance().filter(|_| !arguments.fit_all);
     story.worse().or_else(by_chance).filter(|_| !arguments.accept_anyway)

@@ -40,8 +40,8 @@ impl Drop for Places {
 }
 
 impl Places {
-    /// Reads the model file `original` of `model` and makes the folder. Fails at once if a result could not be written after
-    /// the fit.
+    /// Reads the model file `original` of `model` and makes the folder. Fails at once if a result could not be
+    /// written after the fit.
     pub fn new(
         original: &Path,
         model: &GreyBox,
@@ -51,7 +51,8 @@ impl Places {
         if model.residual.is_some() {
             // the written model would lack the residual's file
             bail!(
-                "model {} has a learned residual, which amend does not write: amend its prior, then learn the residual again",
+                "model {} has a learned residual, which amend does not write: amend its prior, then learn the residual \
+                 again",
                 model.name
             );
         }

@@ -66,8 +66,8 @@ pub(super) struct Flight {
     change: Option<&'static str>,
     /// `None` where no controller could be designed.
     minute: Option<Minute>,
-    /// Ratios of the derivatives estimated in this flight to the aircraft's own, in the order of `DERIVATIVES`; `None` for
-    /// an unknown one. Empty after a change.
+    /// Ratios of the derivatives estimated in this flight to the aircraft's own, in the order of `DERIVATIVES`; `None`
+    /// for an unknown one. Empty after a change.
     pub(super) derivative_ratios: Vec<Option<f64>>,
 }
 

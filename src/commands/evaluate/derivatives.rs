@@ -10,7 +10,7 @@ use crate::model::population::{Character, TRAITS};
 use crate::num::statistics::quantile;
 use crate::physics::atmosphere::STANDARD_GRAVITY;
 
-/// The trait that holds the magnitude of each derivative, and the power of V/g by which the trait is made dimensionless.
+/// The trait that holds the magnitude of each derivative, and the power of V/g that makes it dimensionless.
 const MAGNITUDES: [(&str, i32); DERIVATIVES.len()] = [
     ("roll power", 2),
     ("roll damping", 1),
@@ -32,8 +32,8 @@ fn own(model: &GreyBox) -> Option<[f64; DERIVATIVES.len()]> {
     Some(own)
 }
 
-/// Ratios of the estimated derivatives to the aircraft's own; `None` for a derivative that the flight does not determine.
-/// Empty for an aircraft that cannot be trimmed.
+/// Ratios of the estimated derivatives to the aircraft's own; `None` for a derivative that the flight does not
+/// determine. Empty for an aircraft that cannot be trimmed.
 pub(super) fn ratios(estimator: &AircraftEstimator, exact: &GreyBox) -> Vec<Option<f64>> {
     let Some(own) = own(exact) else { return Vec::new() };
     let all = estimator.derivatives().into_iter().zip(own);

@@ -52,8 +52,8 @@ impl Program {
         self.stop_requested.get_or_insert_with(Instant::now);
     }
 
-    /// Exit status; `None` while the program runs. The program is killed [`STOP_TIMEOUT`] after the stop request. Its output
-    /// is complete when there is a status.
+    /// Exit status; `None` while the program runs. The program is killed [`STOP_TIMEOUT`] after the stop request. Its
+    /// output is complete when there is a status.
     pub fn ended(&mut self) -> Option<ExitStatus> {
         if self.stop_requested.is_some_and(|at| at.elapsed() > STOP_TIMEOUT) {
             let _ = self.child.kill();
