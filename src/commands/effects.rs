@@ -139,13 +139,13 @@ fn catalogue() -> Vec<(Place, Description)> {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.what {
         What::List(json) => {
-            json.writable(Overwrite::Never)?;
+            json.writable(Overwrite::New)?;
             if !json.takes_stdout() {
                 print!("{}", list());
             }
             let all = catalogue();
             let effects = all.iter().map(|(place, about)| Document::new(*place, about)).collect();
-            json.write(SCHEMA, &Listed { effects }, Overwrite::Never)?;
+            json.write(SCHEMA, &Listed { effects }, Overwrite::New)?;
         }
         What::Show(show) => self::show(show)?,
         What::Variables => print!("{}", variables()),

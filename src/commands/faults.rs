@@ -112,7 +112,7 @@ fn counterparts() -> impl TypedValueParser<Value = Counterpart> {
 /// # Errors
 /// If an aircraft or a controller cannot be built, or the file of `--resume` cannot be used.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
-    arguments.json.writable(Overwrite::Never)?;
+    arguments.json.writable(Overwrite::New)?;
     let quiet = arguments.json.takes_stdout();
     let model = fly::model(&arguments.model, None)?;
     let plant = plant(&arguments.aircraft, &model)?;
@@ -164,7 +164,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         print_findings(&entries);
     }
     let document = Document { flights: &entries };
-    arguments.json.write("greylag.faults/1", &document, Overwrite::Never)?;
+    arguments.json.write("greylag.faults/1", &document, Overwrite::New)?;
     let failed = entries.iter().any(|entry| entry.findings.iter().any(|f| f.is_failure()));
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }

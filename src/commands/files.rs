@@ -14,7 +14,9 @@ use crate::report;
 /// Whether an existing file may be replaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overwrite {
-    /// An existing file is kept, and the command fails.
+    /// An existing file is kept, and the command fails. It has no option `--force`.
+    New,
+    /// An existing file is kept, and the command fails. Its option `--force` was not given.
     Never,
     /// An existing file is replaced (option `--force`).
     Force,
@@ -78,8 +80,13 @@ pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
     if is_stdout(Some(path)) {
         return Ok(());
     }
-    if overwrite == Overwrite::Never && path.exists() {
-        bail!("{} exists; name another file, or give --force to replace it", path.display());
+    let remedy = match overwrite {
+        Overwrite::New => Some("name another file"),
+        Overwrite::Never => Some("name another file, or give --force to replace it"),
+        Overwrite::Force => None,
+    };
+    if let Some(remedy) = remedy.filter(|_| path.exists()) {
+        bail!("{} exists; {remedy}", path.display());
     }
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if path.is_dir() || !folder.is_dir() {
@@ -99,7 +106,7 @@ pub fn write(path: &Path, content: &str, overwrite: Overwrite) -> Result<()> {
         };
     }
     match overwrite {
-        Overwrite::Never => report::write_new(path, content)?,
+        Overwrite::New | Overwrite::Never => report::write_new(path, content)?,
         Overwrite::Force => report::write_over(path, content)?,
     }
     Ok(())
@@ -119,6 +126,18 @@ fn line_of(arguments: impl Iterator<Item = OsString>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn force_is_named_where_there_is_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("there.json");
+        std::fs::write(&path, "mine").unwrap();
+        let said = |overwrite| writable(&path, overwrite).unwrap_err().to_string();
+        assert!(said(Overwrite::New).contains("name another file"));
+        assert!(!said(Overwrite::New).contains("--force"));
+        assert!(said(false.into()).contains("--force"));
+        writable(&path, Overwrite::Force).unwrap();
+    }
 
     #[cfg(unix)]
     #[test]

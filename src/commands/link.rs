@@ -95,7 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 fn run_check(check: &Check) -> Result<ExitCode> {
-    check.json.writable(Overwrite::Never)?;
+    check.json.writable(Overwrite::New)?;
     let mut out: Box<dyn Write> =
         if check.json.takes_stdout() { Box::new(io::sink()) } else { Box::new(io::stdout()) };
     let model = flown(&check.model)?;
@@ -264,7 +264,7 @@ fn report(check: &Check, real: &Real, out: &mut dyn Write) -> Result<ExitCode> {
             print_to!(out, "\nwarning: {words}");
         }
     }
-    check.json.write("greylag.link-check/1", &Document::new(real, &missing), Overwrite::Never)?;
+    check.json.write("greylag.link-check/1", &Document::new(real, &missing), Overwrite::New)?;
     if missing.is_empty() {
         print_to!(out, "\n{} can be flown by {:?}", real.profile().stack, real.profile().authority);
         return Ok(ExitCode::SUCCESS);

@@ -93,7 +93,7 @@ fn write(folder: &Path, drawn: &Drawn) -> Result<()> {
     std::fs::create_dir_all(folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     for (name, text) in ["airframe.toml", "model.toml"].iter().zip(&drawn.files) {
-        files::write(&folder.join(name), text, Overwrite::Never)?;
+        files::write(&folder.join(name), text, Overwrite::New)?;
     }
     Ok(())
 }

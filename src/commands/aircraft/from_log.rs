@@ -75,7 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     let page = folder.join("aircraft.html");
     let found = check::page(&fitted, &given::model(&fitted)?)?;
-    files::write(&page, &found, Overwrite::Never)?;
+    files::write(&page, &found, Overwrite::New)?;
     println!("wrote {} and {}", page.display(), folder.join("fit.html").display());
     next(folder, &fitted)?;
     Ok(status)

@@ -79,8 +79,8 @@ pub fn run(jsbsim: &Jsbsim) -> Result<ExitCode> {
     let read = read_back(&found)?;
     std::fs::create_dir_all(out)
         .with_context(|| format!("cannot make the folder {}", out.display()))?;
-    files::write(&out.join("airframe.toml"), &found.airframe, Overwrite::Never)?;
-    files::write(&model, &found.model, Overwrite::Never)?;
+    files::write(&out.join("airframe.toml"), &found.airframe, Overwrite::New)?;
+    files::write(&model, &found.model, Overwrite::New)?;
     println!("wrote {} and airframe.toml beside it", model.display());
     found.left_out.iter().for_each(|what| println!("left out: {what}"));
     super::check::print(&aircraft_check::check(&read)?);

@@ -118,7 +118,7 @@ mod tests {
         let out = tempfile::tempdir().unwrap().path().join("out");
         let file = Path::new("params/x8/learned/model.toml");
         let model = GreyBox::load(file).unwrap();
-        let error = Places::new(file, &model, &out, Overwrite::Never).err().unwrap().to_string();
+        let error = Places::new(file, &model, &out, Overwrite::New).err().unwrap().to_string();
         assert!(error.contains("residual") && !out.exists(), "{error}");
     }
 }
