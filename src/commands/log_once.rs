@@ -16,7 +16,7 @@ impl Write for LogOnce {
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
         if is_new(line) {
             // A closed standard error is ignored: the logger would report this error with `eprintln!`, which panics
-            // there, on the thread of the control loop.
+            // there and ends the thread that warns.
             let _ = io::stderr().write_all(line);
         }
         Ok(line.len())
