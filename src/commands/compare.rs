@@ -111,8 +111,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// The answer for a model and its amendment, with the error change by tuning apart from that by the added effect.
-/// `None` unless there are two models and the second was amended from the first.
+/// The answer for a model and its amendment. It separates the change of the error by tuning from that by the added
+/// effects. `None` unless there are two models and the second was amended from the first.
 #[cfg(feature = "study")]
 fn traced(
     arguments: &Arguments,

@@ -157,7 +157,8 @@ fn suspects(arguments: &Arguments) -> Result<[Suspect; 2]> {
 fn read(text: &str) -> Result<(String, Vec<f64>)> {
     let wrong = || format!("--values {text}: write ID=VALUE,VALUE…, such as drag_alpha2=0.5");
     let (id, values) = text.split_once('=').with_context(wrong)?;
-    let values: Result<Vec<f64>, _> = values.split(',').map(|v| v.trim().parse()).collect();
+    let number = |v: &str| v.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+    let values: Option<Vec<f64>> = values.split(',').map(number).collect();
     Ok((id.trim().into(), values.with_context(wrong)?))
 }
 
@@ -182,4 +183,17 @@ fn table(all: &[Prospect]) -> Table {
         ]);
     }
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_finite_numbers() {
+        assert_eq!(read("drag_alpha2=0.5, -1").unwrap(), ("drag_alpha2".into(), vec![0.5, -1.0]));
+        for wrong in ["drag_alpha2", "drag_alpha2=", "drag_alpha2=nan", "drag_alpha2=1,inf"] {
+            assert!(read(wrong).unwrap_err().to_string().contains("ID=VALUE"), "{wrong}");
+        }
+    }
 }

@@ -125,7 +125,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// Content of the JSON document: the diagnosis, with the answer that also leads screen and page.
+/// Content of the JSON document: the diagnosis, with the answer that the terminal and the page show first.
 #[derive(Serialize)]
 struct Document<'a> {
     #[serde(flatten)]
@@ -143,9 +143,7 @@ fn next(arguments: &Arguments, diagnosis: &Diagnosis, change_percent: f64) -> St
     let (model, out, logs) = (quoted(model), quoted(&out), arguments.logs.words());
     let between = diagnosis.advice.iter().find_map(|a| a.between.as_ref());
     match (diagnosis.verdict, between) {
-        (Verdict::Effect, Some([a, b])) if in_doubt(diagnosis) => {
-            format!("greylag design --between {a} {b}")
-        }
+        (Verdict::Effect, Some(pair)) if in_doubt(diagnosis) => design(&model, pair),
         (Verdict::Effect, _) => format!("greylag amend --model {model}{logs} --accept --out {out}"),
         (Verdict::Adequate, _) if change_percent > -WORTH_TUNING => {
             format!("greylag aircraft check --model {model}")
@@ -163,6 +161,11 @@ fn next(arguments: &Arguments, diagnosis: &Diagnosis, change_percent: f64) -> St
             .iter()
             .fold("greylag logs info".into(), |line, log| line + " " + &quoted(log)),
     }
+}
+
+/// The command that designs a manoeuvre to distinguish two effects.
+fn design(model: &str, [a, b]: &[String; 2]) -> String {
+    format!("greylag design --model {model} --between {a} {b}")
 }
 
 /// Whether an asserted effect could be another one as well.
@@ -297,5 +300,18 @@ fn number(x: f64) -> String {
             let places = (2 - x.abs().log10().floor() as i32).clamp(0, 6) as usize;
             format!("{x:.places$}")
         }
+    }
+}
+
+#[cfg(all(test, feature = "demo"))]
+mod tests {
+    use super::*;
+    use crate::commands::{Command, command_of};
+
+    #[test]
+    fn the_command_that_comes_next_is_whole() {
+        let line = design("model.toml", &["lift_stall", "lift_alpha2"].map(String::from));
+        let words: Vec<_> = line.split(' ').skip(1).map(std::ffi::OsString::from).collect();
+        assert!(matches!(command_of(&words), Ok(Command::Design(_))), "{line}");
     }
 }

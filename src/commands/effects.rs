@@ -139,13 +139,13 @@ fn catalogue() -> Vec<(Place, Description)> {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.what {
         What::List(json) => {
-            json.writable(Overwrite::Never)?;
+            json.writable(Overwrite::New)?;
             if !json.takes_stdout() {
                 print!("{}", list());
             }
             let all = catalogue();
             let effects = all.iter().map(|(place, about)| Document::new(*place, about)).collect();
-            json.write(SCHEMA, &Listed { effects }, Overwrite::Never)?;
+            json.write(SCHEMA, &Listed { effects }, Overwrite::New)?;
         }
         What::Show(show) => self::show(show)?,
         What::Variables => print!("{}", variables()),
@@ -246,6 +246,11 @@ fn written(effect: &Written) {
 fn show(show: &Show) -> Result<()> {
     let (place, about) = named(&show.id)?;
     let overwrite = show.force.into();
+    // both are checked first: with one of them written, the same command would be refused again
+    show.json.writable(overwrite)?;
+    if let Some(path) = &show.report {
+        files::writable(path, overwrite)?;
+    }
     let listed = Listed { effects: vec![Document::new(place, &about)] };
     show.json.write(SCHEMA, &listed, overwrite)?;
     let channels = channels(place, &about);
@@ -253,7 +258,6 @@ fn show(show: &Show) -> Result<()> {
         print(place, &about, &channels);
     }
     let Some(path) = &show.report else { return Ok(()) };
-    files::writable(path, overwrite)?;
     let model = GreyBox::load(&shipped(&show.model))?;
     let values = example(&model, &about);
     if values.is_empty() && place == Place::Prior {
@@ -303,5 +307,23 @@ fn example(model: &GreyBox, about: &Description) -> Vec<f64> {
             let named = model.coefficients().iter();
             named.filter(|c| c.name.starts_with(&own)).map(|c| c.value).collect()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::command_of;
+
+    #[test]
+    fn nothing_is_written_if_the_page_exists() {
+        let folder = tempfile::tempdir().unwrap();
+        let [page, json] = ["page.html", "effect.json"].map(|name| folder.path().join(name));
+        std::fs::write(&page, "mine").unwrap();
+        let words = ["effects", "show", "drag_beta2", "--report"];
+        let mut line: Vec<std::ffi::OsString> = words.map(Into::into).into();
+        line.extend([page.into_os_string(), "--json".into(), json.clone().into_os_string()]);
+        assert!(crate::commands::run(command_of(&line).unwrap()).is_err());
+        assert!(!json.exists());
     }
 }

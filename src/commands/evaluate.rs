@@ -48,6 +48,22 @@ const IN_JSBSIM: [&str; 11] = [
     "start_altitude_m",
 ];
 
+/// Options that do not apply to drawn aircraft. They fly random attitudes, with controllers that are designed from their
+/// own models and have no envelope limiter.
+const UNUSED_BY_ANY: [&str; 11] = [
+    "draws",
+    "steps",
+    "no_targets",
+    "targets",
+    "groups",
+    "every",
+    "beyond_envelope",
+    "models",
+    "policies",
+    "changes",
+    "envelope",
+];
+
 /// Options of `greylag evaluate`.
 #[derive(clap::Args)]
 pub struct Arguments {
@@ -90,7 +106,7 @@ pub struct Arguments {
     draws: Option<u32>,
     /// Fly aircraft drawn from a distribution, so many, in place of JSBSim: a minute of random attitudes each. A controller
     /// that needs a model is designed from the aircraft's own and from a textbook's.
-    #[arg(long, value_name = "N", conflicts_with_all = IN_JSBSIM, conflicts_with_all = ["draws", "steps", "targets", "groups", "every"], value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", conflicts_with_all = IN_JSBSIM, conflicts_with_all = UNUSED_BY_ANY, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     any: Option<u32>,
     /// The distribution of --any, and models beside it whose aircraft fly the same minute.
     #[command(flatten)]

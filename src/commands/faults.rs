@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use comfy_table::Table;
@@ -112,7 +112,7 @@ fn counterparts() -> impl TypedValueParser<Value = Counterpart> {
 /// # Errors
 /// If an aircraft or a controller cannot be built, or the file of `--resume` cannot be used.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
-    arguments.json.writable(Overwrite::Never)?;
+    arguments.json.writable(Overwrite::New)?;
     let quiet = arguments.json.takes_stdout();
     let model = fly::model(&arguments.model, None)?;
     let plant = plant(&arguments.aircraft, &model)?;
@@ -137,7 +137,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         }
         let before = entries.len();
         for &counterpart in &arguments.counterpart {
-            let seeds = arguments.first..arguments.first + arguments.flights;
+            let seeds = seeds(arguments.first, arguments.flights)?;
             let fly = |seed| -> Result<Entry> {
                 let case = Case { seed, controller, counterpart };
                 if let Some(known) = ledger.as_ref().and_then(|ledger| ledger.find(&case)) {
@@ -164,9 +164,19 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         print_findings(&entries);
     }
     let document = Document { flights: &entries };
-    arguments.json.write("greylag.faults/1", &document, Overwrite::Never)?;
+    arguments.json.write("greylag.faults/1", &document, Overwrite::New)?;
     let failed = entries.iter().any(|entry| entry.findings.iter().any(|f| f.is_failure()));
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// The seeds of `flights` flights from `first` on.
+///
+/// # Errors
+/// If a seed would exceed 64 bits.
+fn seeds(first: u64, flights: u64) -> Result<std::ops::Range<u64>> {
+    let end = first.checked_add(flights);
+    let end = end.with_context(|| format!("--first {first} leaves no room for {flights} seeds"))?;
+    Ok(first..end)
 }
 
 /// Factory of the default companions of scenarios: the controller `kind` of the default model, with the X8.
@@ -299,6 +309,13 @@ mod tests {
                 );
             }
         });
+    }
+
+    #[test]
+    fn the_seeds_end_at_the_largest_number() {
+        assert_eq!(seeds(3, 2).unwrap(), 3..5);
+        assert_eq!(seeds(u64::MAX - 1, 1).unwrap(), u64::MAX - 1..u64::MAX);
+        assert!(seeds(u64::MAX, 1).is_err());
     }
 
     #[test]

@@ -1,18 +1,22 @@
 //! Files that a user names on the command line.
 
-use std::io::Write;
+use std::ffi::OsString;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use serde::Serialize;
 
 pub use super::shipped::shipped;
+use crate::logs::quoted;
 use crate::report;
 
 /// Whether an existing file may be replaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overwrite {
-    /// An existing file is kept, and the command fails.
+    /// An existing file is kept, and the command fails. It has no option `--force`.
+    New,
+    /// An existing file is kept, and the command fails. Its option `--force` was not given.
     Never,
     /// An existing file is replaced (option `--force`).
     Force,
@@ -76,8 +80,13 @@ pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
     if is_stdout(Some(path)) {
         return Ok(());
     }
-    if overwrite == Overwrite::Never && path.exists() {
-        bail!("{} exists; name another file, or give --force to replace it", path.display());
+    let remedy = match overwrite {
+        Overwrite::New => Some("name another file"),
+        Overwrite::Never => Some("name another file, or give --force to replace it"),
+        Overwrite::Force => None,
+    };
+    if let Some(remedy) = remedy.filter(|_| path.exists()) {
+        bail!("{} exists; {remedy}", path.display());
     }
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if path.is_dir() || !folder.is_dir() {
@@ -90,11 +99,14 @@ pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
 pub fn write(path: &Path, content: &str, overwrite: Overwrite) -> Result<()> {
     writable(path, overwrite)?;
     if is_stdout(Some(path)) {
-        std::io::stdout().write_all(content.as_bytes())?;
-        return Ok(());
+        return match std::io::stdout().write_all(content.as_bytes()) {
+            // the reader has seen enough, as in `greylag … | head`
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => std::process::exit(0),
+            written => Ok(written?),
+        };
     }
     match overwrite {
-        Overwrite::Never => report::write_new(path, content)?,
+        Overwrite::New | Overwrite::Never => report::write_new(path, content)?,
         Overwrite::Force => report::write_over(path, content)?,
     }
     Ok(())
@@ -102,5 +114,37 @@ pub fn write(path: &Path, content: &str, overwrite: Overwrite) -> Result<()> {
 
 /// The command line of this run, for reports.
 pub fn command_line() -> String {
-    std::env::args().skip(1).fold("greylag".into(), |line, a| line + " " + &a)
+    line_of(std::env::args_os().skip(1))
+}
+
+/// The command line with these arguments, quoted for a shell. An argument may be no Unicode text, such as the path of
+/// an old log: its invalid bytes are replaced.
+fn line_of(arguments: impl Iterator<Item = OsString>) -> String {
+    arguments.fold("greylag".into(), |line, word| line + " " + &quoted(Path::new(&word)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn force_is_named_where_there_is_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("there.json");
+        std::fs::write(&path, "mine").unwrap();
+        let said = |overwrite| writable(&path, overwrite).unwrap_err().to_string();
+        assert!(said(Overwrite::New).contains("name another file"));
+        assert!(!said(Overwrite::New).contains("--force"));
+        assert!(said(false.into()).contains("--force"));
+        writable(&path, Overwrite::Force).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_command_line_is_written_whatever_its_words_are() {
+        use std::os::unix::ffi::OsStringExt;
+        let words = [b"compare".to_vec(), b"my flight.csv".to_vec(), b"fl\xfcg.csv".to_vec()];
+        let line = line_of(words.into_iter().map(OsString::from_vec));
+        assert_eq!(line, "greylag compare 'my flight.csv' 'fl\u{fffd}g.csv'");
+    }
 }

@@ -95,7 +95,7 @@ impl FlownWith {
         let text = "# What flew this flight; `greylag replay` and `greylag report` read it.\n"
             .to_owned()
             + &toml::to_string(&said)?;
-        files::write(&folder.join(FILE), &text, Overwrite::Never)
+        files::write(&folder.join(FILE), &text, Overwrite::New)
     }
 
     /// Reads the file from a recording; `None` if the recording has no such file. Recordings from before November 2026

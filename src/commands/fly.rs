@@ -16,6 +16,7 @@ use crate::commands::controllers::{POLICY, check_changes, controller};
 use crate::commands::exposure::{self, Asked};
 use crate::commands::files::shipped;
 use crate::commands::flown_with::{Chosen, FlownWith};
+use crate::commands::terminal::{complain, say};
 use crate::commands::watchdog;
 use crate::commands::{margin, punctual};
 use crate::control::aircraft_estimate::AircraftEstimator;
@@ -237,7 +238,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if let Some(folder) = &flight.recording {
         // the flight continues, because the recording is complete without this file
         if let Err(why) = FlownWith::write(folder, &arguments.chosen(), &model) {
-            eprintln!("greylag: `replay` will need this flight's options: {why:#}");
+            complain(format_args!("`replay` will need this flight's options: {why:#}"));
         }
     }
     watchdog::feed(flight.rounds.clone());
@@ -247,9 +248,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let recorded = flight.recording.clone();
     let summary =
         flight.join().context("the control thread has died; the recording holds all up to then")?;
-    println!("{summary}");
+    say(format_args!("{summary}"));
     #[cfg(feature = "demo")]
-    recorded.iter().for_each(|folder| println!("next: greylag report {}", quoted(folder)));
+    recorded.iter().for_each(|folder| say(format_args!("next: greylag report {}", quoted(folder))));
     Ok(ExitCode::SUCCESS)
 }
 
@@ -344,24 +345,24 @@ fn fallback(model: &GreyBox) -> anyhow::Result<Box<dyn Controller>> {
 }
 
 fn announce(arguments: &Arguments, model: &GreyBox, flight: &Flight) {
-    println!("controller {}, model {}", arguments.controller, arguments.model.display());
-    println!("model      {}: {}", model.name, model.description);
-    println!("vehicle    {}", arguments.vehicle);
+    say(format_args!("controller {}, model {}", arguments.controller, arguments.model.display()));
+    say(format_args!("model      {}: {}", model.name, model.description));
+    say(format_args!("vehicle    {}", arguments.vehicle));
     for client in arguments.all_clients() {
-        println!("clients    {client}");
+        say(format_args!("clients    {client}"));
     }
     match &flight.recording {
-        Some(folder) => println!("recording  {}", folder.display()),
-        None => println!("recording  none"),
+        Some(folder) => say(format_args!("recording  {}", folder.display())),
+        None => say(format_args!("recording  none")),
     }
-    println!("waiting for a vehicle; Ctrl-C ends");
+    say(format_args!("waiting for a vehicle; Ctrl-C ends"));
 }
 
 /// Prints the events of the flight until it ends.
 fn show_events(flight: &Flight, vehicle: &Address) {
     while flight.is_flying() {
         match flight.events.recv_timeout(Duration::from_millis(50)) {
-            Ok(event) => println!("{}", line(&event, vehicle)),
+            Ok(event) => say(format_args!("{}", line(&event, vehicle))),
             Err(RecvTimeoutError::Timeout) => {}
             // The control thread is about to end.
             Err(RecvTimeoutError::Disconnected) => return,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
-use super::{given, mistake};
+use super::{bar, given, mistake};
 use crate::logs::finding::{Finding, Severity};
 use crate::logs::mapping::Mapping;
 use crate::logs::phases::Flying;
@@ -154,7 +154,9 @@ impl Reading {
         reading.mapping = reading.mapping.with_mixer(model.airframe.mixer.clone());
         let mut intake = Intake::default();
         for (k, (path, name)) in paths.iter().zip(logs::names(paths)).enumerate() {
-            eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, paths.len());
+            if !bar::is_silent() {
+                eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, paths.len());
+            }
             let read = given::log(path)
                 .and_then(|()| logs::flights(path, &reading).map_err(|e| units_first(path, e)));
             let logs = match read {

@@ -4,7 +4,7 @@ mod key;
 mod shown;
 
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -23,6 +23,7 @@ use crate::link::address::Address;
 use crate::link::peer::LinkId;
 use crate::link::transport::{Arrival, Link, Network};
 use crate::link::vehicle::{Authority, Profile, Real, Stack};
+use crate::model::GreyBox;
 use crate::physics::airframe::ActuatorFigures;
 use shown::{delay, latency, parameters};
 
@@ -94,10 +95,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 fn run_check(check: &Check) -> Result<ExitCode> {
-    check.json.writable(Overwrite::Never)?;
+    check.json.writable(Overwrite::New)?;
     let mut out: Box<dyn Write> =
         if check.json.takes_stdout() { Box::new(io::sink()) } else { Box::new(io::stdout()) };
-    let model = fly::model(&check.model, None)?;
+    let model = flown(&check.model)?;
     let mut listener = Listener::open(&check.vehicle)?;
     let actuators = model.airframe.actuators;
     let asked = check.profile.and_then(ProfileName::stack);
@@ -113,6 +114,11 @@ fn run_check(check: &Check) -> Result<ExitCode> {
     }
     let real = listener.listen(real, Duration::from_secs(check.seconds));
     report(check, &real, &mut out)
+}
+
+/// The model as `greylag fly` flies it through a flight controller: no message of the link commands a rudder.
+fn flown(file: &Path) -> Result<GreyBox> {
+    Ok(fly::model(file, None)?.leaving_rudder())
 }
 
 /// An open link and the messages received on it.
@@ -258,7 +264,7 @@ fn report(check: &Check, real: &Real, out: &mut dyn Write) -> Result<ExitCode> {
             print_to!(out, "\nwarning: {words}");
         }
     }
-    check.json.write("greylag.link-check/1", &Document::new(real, &missing), Overwrite::Never)?;
+    check.json.write("greylag.link-check/1", &Document::new(real, &missing), Overwrite::New)?;
     if missing.is_empty() {
         print_to!(out, "\n{} can be flown by {:?}", real.profile().stack, real.profile().authority);
         return Ok(ExitCode::SUCCESS);
@@ -361,5 +367,18 @@ fn remedy(stack: Stack) -> &'static str {
     match stack {
         Stack::Px4 => "raise the port's data rate (MAV_1_RATE) or its baud rate",
         Stack::Ardupilot => "raise the port's baud rate, or SCHED_LOOP_RATE (then reboot)",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The delay margin of a check is that of the flight.
+    #[test]
+    fn a_link_without_a_rudder_command_is_checked_without_a_rudder() {
+        let file = Path::new("params/c172p/jsbsim.toml");
+        assert!(fly::model(file, None).unwrap().has_rudder());
+        assert!(!flown(file).unwrap().has_rudder());
     }
 }

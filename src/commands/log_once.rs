@@ -15,7 +15,9 @@ pub struct LogOnce;
 impl Write for LogOnce {
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
         if is_new(line) {
-            io::stderr().write_all(line)?;
+            // A closed standard error is ignored: the logger would report this error with `eprintln!`, which panics
+            // there and ends the thread that warns.
+            let _ = io::stderr().write_all(line);
         }
         Ok(line.len())
     }

@@ -121,7 +121,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.verb {
         Verb::Info { files, json, write_mapping, model, reading } => {
             if let Some(path) = write_mapping {
-                files::writable(path, files::Overwrite::Never)?;
+                files::writable(path, files::Overwrite::New)?;
             }
             let model =
                 model.as_deref().map(|path| GreyBox::load(&files::shipped(path))).transpose()?;
@@ -155,6 +155,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
                     .down_to(log.flies.sustained_s);
             let flight = flight_path::reconstruct(&log.flight, &options)?;
             csv_file(&flight.to_flight(), output, *force)?;
+            log.findings.iter().for_each(|finding| eprintln!("{finding}"));
             print_reconstruction(&flight, output);
             Ok(ExitCode::SUCCESS)
         }
@@ -166,7 +167,7 @@ fn write_mapping_file(path: &Path, logs: &[Info]) -> Result<ExitCode> {
     let Some(text) = mapping(logs) else {
         bail!("no factor puts anything of these logs right, so no mapping was written");
     };
-    files::write(path, &text, files::Overwrite::Never)?;
+    files::write(path, &text, files::Overwrite::New)?;
     println!("\nwrote {}; add: --mapping {}", path.display(), quoted(path));
     Ok(ExitCode::SUCCESS)
 }

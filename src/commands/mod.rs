@@ -304,7 +304,9 @@ fn run(command: Command) -> Result<ExitCode> {
 #[cfg(feature = "study")]
 fn command_of(line: &[OsString]) -> Result<Command> {
     let words = std::iter::once(OsString::from("greylag")).chain(line.iter().cloned());
-    Ok(Arguments::try_parse_from(words)?.command)
+    let found = with_signs(<Arguments as clap::CommandFactory>::command());
+    let found = found.try_get_matches_from(words)?;
+    Ok(<Arguments as clap::FromArgMatches>::from_arg_matches(&found)?.command)
 }
 
 /// Rejects lines that are neither a learning stage nor a campaign cell.
@@ -331,5 +333,19 @@ fn carry_out(line: &[OsString], stop: &Interruption) -> Result<Ended> {
         #[cfg(feature = "learn")]
         Command::Train(arguments) => train::learn(&arguments, stop),
         _ => bail!("greylag {} cannot be a stage", line[0].display()),
+    }
+}
+
+#[cfg(all(test, feature = "study"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stage_takes_negative_numbers_as_the_command_line_does() {
+        let words =
+            ["aircraft", "new", "own", "--mass-kg", "-2", "--span-m", "2", "--area-m2", "1"];
+        let line = words.map(OsString::from);
+        // its own check says what a mass may be
+        assert!(matches!(command_of(&line), Ok(Command::Aircraft(_))));
     }
 }

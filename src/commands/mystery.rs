@@ -56,7 +56,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE", group = "what")]
     hide: Option<PathBuf>,
     /// Amplitude in the effect's unit; for an effect of a file, its first coefficient.
-    #[arg(long, requires = "what", allow_negative_numbers = true)]
+    #[arg(long, requires = "what", allow_negative_numbers = true, value_parser = finite)]
     amplitude: Option<f64>,
     /// Fly in MIL-spec turbulence: 3 light, 4 moderate.
     #[arg(long, value_name = "1..7", value_parser = clap::value_parser!(u8).range(1..=7))]
@@ -71,6 +71,12 @@ pub struct Arguments {
     /// Open the answer without a diagnosis: the game is over then.
     #[arg(long, requires = "open")]
     give_up: bool,
+}
+
+/// Reads a finite number.
+fn finite(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|x| x.is_finite());
+    number.ok_or_else(|| "give a finite number".into())
 }
 
 /// The effect that was hidden.
@@ -334,4 +340,17 @@ fn beside(answer: &Answer, said: &serde_json::Value) {
         ]);
     }
     println!("{table}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_amplitude_is_a_finite_number() {
+        assert_eq!(finite("-0.5"), Ok(-0.5));
+        for wrong in ["nan", "inf", "much"] {
+            assert!(finite(wrong).is_err(), "{wrong}");
+        }
+    }
 }

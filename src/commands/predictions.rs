@@ -105,6 +105,14 @@ fn run<'a>(
     horizons_s.iter().enumerate().filter_map(at).collect()
 }
 
+/// A name as a field of the table: in quotes if it holds a comma, a quote or a line break (RFC 4180).
+fn field(name: &str) -> String {
+    match name.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", name.replace('"', "\"\"")),
+        false => name.to_owned(),
+    }
+}
+
 fn write_row(text: &mut String, row: &Row, all: &[Row], horizons_s: &[f64]) {
     let same = |r: &&Row| r.horizon == row.horizon && !std::ptr::eq::<Row>(*r, row);
     let (mut squares, mut count) = ([0.0; 8], 0.0);
@@ -115,11 +123,36 @@ fn write_row(text: &mut String, row: &Row, all: &[Row], horizons_s: &[f64]) {
     }
     let horizon = horizons_s[row.horizon];
     // writing to a String cannot fail
-    let _ = write!(text, "{},{},{},{horizon}", row.model, row.flight, row.start_s);
+    let [model, flight] = [row.model, &row.flight].map(field);
+    let _ = write!(text, "{model},{flight},{},{horizon}", row.start_s);
     let bound = |x: f64| if x.is_finite() { format!("{x}") } else { String::new() };
     for ((x, measured), square) in row.predicted.iter().zip(&row.measured).zip(squares) {
         let half = NORMAL_95 * (square / count).sqrt();
         let _ = write!(text, ",{x},{measured},{},{}", bound(x - half), bound(x + half));
     }
     text.push('\n');
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_with_a_comma_is_one_field() {
+        let row = |model| Row {
+            model,
+            flight: "flight 2, \"windy\".csv".into(),
+            start_s: 3.0,
+            horizon: 0,
+            predicted: [0.0; 8],
+            measured: [0.0; 8],
+        };
+        let rows = [row("x8")];
+        let mut text = header();
+        write_row(&mut text, &rows[0], &rows, &[1.0]);
+        let mut read = csv::Reader::from_reader(text.as_bytes());
+        let record = read.records().next().unwrap().unwrap();
+        assert_eq!(&record[1], "flight 2, \"windy\".csv");
+        assert_eq!(&record[3], "1");
+    }
 }

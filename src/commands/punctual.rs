@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::commands::terminal::{complain, say};
 use crate::flight::runtime::{Class, Punctuality, take_real_time};
 
 /// Duration of the measurement: two hundred cycles of 10 ms.
@@ -30,12 +31,12 @@ pub fn print_timing(class: Class) {
     let measured = move || {
         let punctuality = Punctuality::measure(MEASURED);
         let class_words = if class == Class::RealTime { "SCHED_FIFO, " } else { "" };
-        println!("timing     {class_words}{punctuality}");
+        say(format_args!("timing     {class_words}{punctuality}"));
         for line in punctuality.advice(class) {
-            println!("timing     advice: {line}");
+            say(format_args!("timing     advice: {line}"));
         }
     };
     if let Err(why) = std::thread::Builder::new().name("timing".into()).spawn(measured) {
-        eprintln!("greylag: the punctuality of this computer is not measured: {why}");
+        complain(format_args!("the punctuality of this computer is not measured: {why}"));
     }
 }

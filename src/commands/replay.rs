@@ -169,13 +169,13 @@ impl From<&Outcome> for Document {
 /// # Errors
 /// If a file of the recording, the model or the policy cannot be read or is invalid.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
-    arguments.json.writable(Overwrite::Never)?;
+    arguments.json.writable(Overwrite::New)?;
     let Again { companion, vehicle, .. } = arguments.flown.again(&arguments.folder)?;
     let outcome = replay(&arguments.folder, companion, vehicle)?;
     if !arguments.json.takes_stdout() {
         print(&outcome);
     }
-    arguments.json.write("greylag.replay/1", &Document::from(&outcome), Overwrite::Never)?;
+    arguments.json.write("greylag.replay/1", &Document::from(&outcome), Overwrite::New)?;
     let exact = outcome.different == 0 && outcome.without_state <= u64::from(outcome.cut_short);
     Ok(if exact && outcome.ticks > 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

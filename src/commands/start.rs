@@ -30,8 +30,8 @@ impl StartArguments {
     /// The start of `aircraft`, flown with controllers of `models`.
     ///
     /// # Errors
-    /// If neither the option nor a model gives an airspeed, or if the airspeed is below the smallest airspeed of a
-    /// model.
+    /// If neither the option nor a model gives an airspeed, if a number is not finite, or if the airspeed is below the
+    /// smallest airspeed of a model.
     pub fn start(&self, aircraft: &str, models: &[GreyBox]) -> Result<Start> {
         let cruise = models.first().map(|m| m.airframe.envelope.airspeed_cruise_mps);
         let default = if aircraft == X8 { Some(Start::NEUTRAL.airspeed_mps) } else { cruise };
@@ -40,6 +40,9 @@ impl StartArguments {
                 "no model says how fast the aircraft '{aircraft}' flies: give --start-airspeed-mps"
             );
         };
+        if !(airspeed_mps.is_finite() && self.start_altitude_m.is_finite()) {
+            bail!("--start-airspeed-mps and --start-altitude-m: give finite numbers");
+        }
         for model in models {
             let slowest = model.airframe.envelope.airspeed_min_mps;
             if airspeed_mps < slowest {
@@ -132,6 +135,8 @@ mod tests {
         let slow = 0.9 * models[0].airframe.envelope.airspeed_min_mps;
         let message = start(Some(slow), "x8", &models).unwrap_err().to_string();
         assert!(message.contains("airspeed_min_mps"), "{message}");
+        let message = start(Some(f64::NAN), "x8", &models).unwrap_err().to_string();
+        assert!(message.contains("--start-airspeed-mps"), "{message}");
         let message = start(None, "other", &[]).unwrap_err().to_string();
         assert!(message.contains("--start-airspeed-mps"), "{message}");
     }

@@ -1,6 +1,7 @@
 //! Output on a terminal: tables of limited width, the answer in colour, the summary last.
 
-use std::io::IsTerminal;
+use std::fmt::Arguments;
+use std::io::{self, IsTerminal, Write};
 
 #[cfg(feature = "study")]
 use comfy_table::ColumnConstraint;
@@ -64,7 +65,7 @@ pub enum Tone {
 
 /// `text` in the colour of `tone` on a terminal. The text is unchanged elsewhere, or if NO_COLOR is set.
 pub fn painted(text: &str, tone: Tone) -> String {
-    let plain = !std::io::stdout().is_terminal() || std::env::var_os("NO_COLOR").is_some();
+    let plain = !io::stdout().is_terminal() || std::env::var_os("NO_COLOR").is_some();
     match tone {
         _ if plain => text.to_owned(),
         Tone::Good => format!("\u{1b}[1;32m{text}\u{1b}[0m"),
@@ -89,6 +90,17 @@ pub fn broken(text: &str) -> String {
         }
     }
     lines.join("\n")
+}
+
+/// Prints a line to standard output. An output that the reader has closed is ignored: `println!` would panic there,
+/// and a panic of the main thread ends the flight.
+pub fn say(line: Arguments<'_>) {
+    let _ = writeln!(io::stdout(), "{line}");
+}
+
+/// Prints an error of the program to standard error, and ignores a closed one like [`say`].
+pub fn complain(line: Arguments<'_>) {
+    let _ = writeln!(io::stderr(), "greylag: {line}");
 }
 
 /// Prints the answer box, before any other output of a command.

@@ -6,6 +6,8 @@ use std::time::Duration;
 
 use sd_notify::NotifyState;
 
+use crate::commands::terminal::complain;
+
 /// Notifies systemd's watchdog twice per watchdog period if `rounds` has changed since the last check. Does nothing if
 /// systemd has no watchdog for this process. If the control thread hangs, the notifications stop, and systemd restarts
 /// the process.
@@ -24,6 +26,6 @@ pub fn feed(rounds: Arc<AtomicU64>) {
         }
     });
     if let Err(why) = started {
-        eprintln!("greylag: systemd's watchdog will not be fed: {why}");
+        complain(format_args!("systemd's watchdog will not be fed: {why}"));
     }
 }

@@ -271,6 +271,9 @@ impl Bench {
     fn tick(self: &Arc<Self>, seen: u64, effect: String) -> Result<(), WorkbenchError> {
         self.same_model()?;
         self.change(seen, |inner| {
+            if inner.model.residual.is_some() {
+                return Err(WorkbenchError::Residual(inner.model.name.clone()));
+            }
             inner.divided()?;
             if catalogue::describe(&effect).is_none() {
                 return Err(WorkbenchError::Amend(

@@ -100,7 +100,7 @@ impl Inner {
     fn mapping_words(&self) -> String {
         let mapping = self.mapping.file.iter().map(|file| format!(" --mapping {}", quoted(file)));
         let lenient = (self.given.tolerance == Tolerance::Lenient).then(|| " --lenient".to_owned());
-        mapping.chain(lenient).collect()
+        mapping.chain(lenient).chain([self.given.source_words()]).collect()
     }
 
     /// Options for a command that reads the logs of `roles`, including the option for logs with problems if it is needed.

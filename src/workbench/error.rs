@@ -123,6 +123,12 @@ pub enum WorkbenchError {
     /// There is nothing to undo or redo.
     #[error("there is nothing to {0}")]
     Nothing(&'static str),
+    /// The model has a learned residual, whose file an amended model would lack.
+    #[error(
+        "model {0} has a learned residual, with which no effect can be accepted: open a session with its prior, then \
+         learn the residual again"
+    )]
+    Residual(String),
     /// The model or the session already contains the effect.
     #[error("{0} is in the model already")]
     Present(String),

@@ -24,7 +24,7 @@ impl Inner {
             env!("CARGO_PKG_VERSION"),
             &self.session.model_sha256,
             &self.mapping.text,
-            &format!("{:?}", self.given.tolerance),
+            &format!("{:?}{}", self.given.tolerance, self.given.source_words()),
             &logs(Role::Fit),
             // a diagnosis does not use hold-out flights
             &if what == "diagnosis" { String::new() } else { logs(Role::HoldOut) },

@@ -57,8 +57,8 @@ impl Bench {
 }
 
 impl Inner {
-    /// Reads the logs again with one more factor. Logs that remain in doubt become unused. The log at `place` gets its default
-    /// role if it is no longer in doubt.
+    /// Reads the logs again with one more factor. Logs that remain in doubt become unused, unless the user wants such
+    /// logs (`--despite-problems`). The log at `place` gets its default role if it is no longer in doubt.
     fn map(&mut self, place: usize, column: &str, scale: f64) -> Result<(), WorkbenchError> {
         let path = self.folder.join(FILE);
         let flight = self.flights.get(place).and_then(|f| f.as_ref().ok());
@@ -71,7 +71,7 @@ impl Inner {
         let text = with_column(&self.mapping.text, column, &from, scale);
         self.read_by(&path, text.ok_or_else(|| WorkbenchError::NoMapping(path.clone()))?)?;
         self.reread();
-        let all = self.flights.iter().enumerate();
+        let all = self.flights.iter().enumerate().filter(|_| !self.given.despite_problems);
         let doubtful = all.filter(|(_, flight)| flight.as_ref().is_ok_and(|f| f.in_doubt()));
         for k in doubtful.map(|(k, _)| k).collect::<Vec<_>>() {
             self.give_role(k, Role::Unused)?;

@@ -20,8 +20,9 @@ use greylag_report::write_over;
 use greylag_sysid::amend::document::sha256;
 use greylag_sysid::compare::{self, ChannelId, compare};
 use greylag_sysid::diagnose::{Curve, over_the_best};
+use greylag_sysid::flight_path::reconstruction::Reconstruction;
 use greylag_sysid::progress::ignore_progress;
-use greylag_sysid::weak_form::prepared::Prepared;
+use greylag_sysid::weak_form::prepared::{ClockError, Prepared};
 
 /// Subfolder of the session's folder for effect files.
 pub(super) const EFFECTS: &str = "effects";
@@ -138,13 +139,20 @@ impl Bench {
         let models = [without, with];
         let comparison =
             compare(&models, &flights, &compare::Options::default(), &ignore_progress)?;
-        let slowest = models[0].airframe.envelope.flying_from_mps();
-        let prepared = flights.iter().map(|f| Prepared::new(f, slowest));
-        let prepared = prepared.collect::<Result<Vec<_>, _>>()?;
+        let prepared = compared(&flights, models[0].airframe.envelope.flying_from_mps())?;
         let all = ChannelId::ALL.iter().filter_map(|id| made(&comparison, &prepared, *id));
         let most = all.max_by(|a, b| a.weight().total_cmp(&b.weight()));
         Ok(most.and_then(|m| over_the_best(m.id, m.made, m.left, &m.regimes, relative)))
     }
+}
+
+/// The flights that a comparison uses, in its order: those with a window. `slowest` is the airspeed at which flight
+/// begins, m/s.
+fn compared(flights: &[Reconstruction], slowest: f64) -> Result<Vec<Prepared>, ClockError> {
+    let prepared = flights.iter().map(|f| Prepared::new(f, slowest));
+    let mut prepared = prepared.collect::<Result<Vec<_>, _>>()?;
+    prepared.retain(|f| !f.windows.is_empty());
+    Ok(prepared)
 }
 
 /// Contribution of an effect to a channel in each window, with the residual of the model without the effect.
@@ -250,4 +258,24 @@ impl Inner {
 /// Path of the file for the effect `id`, in the session's folder `folder`.
 fn effect_file(folder: &Path, id: &str) -> PathBuf {
     folder.join(EFFECTS).join(format!("{id}.toml"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flights::Loaded;
+
+    #[test]
+    fn a_flight_without_a_window_is_not_compared() {
+        let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+        let model = GreyBox::load(&root.join("params/x8/prior.toml")).unwrap();
+        let bytes = fs::read(root.join("tests/data/odd_logs/good.csv")).unwrap();
+        let options = greylag_logs::Options::default();
+        let loaded = Loaded::parse(&bytes, "good.csv", &options, &model).unwrap();
+        let mut short = loaded.flight.clone();
+        short.segments.iter_mut().for_each(|s| s.instants.truncate(3));
+        let slowest = model.airframe.envelope.flying_from_mps();
+        let used = compared(&[short, loaded.flight.clone()], slowest).unwrap();
+        assert!(used.len() == 1 && !used[0].windows.is_empty());
+    }
 }

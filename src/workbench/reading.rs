@@ -10,6 +10,7 @@ use super::mapping::FILE;
 use greylag_logs as logs;
 use greylag_logs::csv::Tolerance;
 use greylag_logs::mapping::Mapping;
+use greylag_logs::quoted;
 use greylag_logs::sources::Asked;
 
 /// Command-line options for reading logs.
@@ -39,6 +40,12 @@ impl Reading {
     pub(super) fn absolute(self) -> Result<Reading, WorkbenchError> {
         let whole = |path: PathBuf| fs::canonicalize(&path).map_err(|e| io(&path, e));
         Ok(Reading { mapping: self.mapping.map(whole).transpose()?, ..self })
+    }
+
+    /// The requested instances as words of a command line, each with a space before it.
+    pub(super) fn source_words(&self) -> String {
+        let word = |asked: &Asked| format!(" --source {}", quoted(Path::new(&asked.to_string())));
+        self.sources.iter().map(word).collect()
     }
 }
 

@@ -34,8 +34,9 @@ impl Inner {
             (None, Some(place)) => self.session.logs[place].role,
             (None, None) => self.session.usual_role(&entry.name()),
         };
-        // a log in doubt stays unused until the user gives it a role
-        let role = if loaded.in_doubt() { Role::Unused } else { usual };
+        // a log in doubt stays unused until the user gives it a role, unless the user wants such logs
+        let refused = loaded.in_doubt() && !self.given.despite_problems;
+        let role = if refused { Role::Unused } else { usual };
         let entry = LogEntry { role, ..entry };
         match before {
             Some(place) => {

@@ -108,3 +108,28 @@ fn what_is_missing_is_asked_for() {
     assert_eq!(output.status.code(), Some(1));
     assert!(text(&output.stderr).contains("no flight"), "{}", text(&output.stderr));
 }
+
+#[test]
+fn quiet_leaves_results_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let a = log(folder.path(), "a.csv", 1, 25.0);
+    let output = greylag(&["--quiet", "--model", "params/x8/prior.toml", "--log", &a]);
+    assert!(output.status.success() && !output.stdout.is_empty());
+    assert_eq!(text(&output.stderr), "");
+}
+
+#[test]
+fn a_reconstruction_says_what_was_found_in_its_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let [path, out] = ["a.csv", "path.csv"].map(|name| folder.path().join(name));
+    let mut flight = fly(3, 25.0, REALISTIC);
+    flight.samples[100].time_s = flight.samples[99].time_s;
+    csv::save(&flight, &path).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_greylag"))
+        .args(["logs", "reconstruct"])
+        .args([path, out])
+        .output()
+        .unwrap();
+    let said = text(&output.stderr);
+    assert!(output.status.success() && said.contains("1 rows dropped"), "{said}");
+}

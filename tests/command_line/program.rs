@@ -318,7 +318,8 @@ fn evaluate_flies_models_drawn_from_widths() {
 
 #[test]
 fn a_reader_that_leaves_is_no_fault() {
-    for arguments in [["effects", "list"], ["completions", "bash"]] {
+    let json = ["effects", "list", "--json", "-"];
+    for arguments in [&["effects", "list"][..], &["completions", "bash"], &json] {
         let mut child = Command::new(env!("CARGO_BIN_EXE_greylag"))
             .args(arguments)
             .stdout(Stdio::piped())

@@ -98,6 +98,20 @@ fn systemds_watchdog_is_fed_while_the_control_loop_runs() {
     assert!(systemd.recv(&mut word).is_err());
 }
 
+/// As in `greylag fly | head`, or over a connection that is cut.
+#[test]
+fn a_flight_goes_on_without_a_reader_of_its_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let links = ["--vehicle", "udpin:127.0.0.1:0", "--client", "udpin:127.0.0.1:0"];
+    let mut command = fly(folder.path(), &links);
+    command.args(["--controller", "lqi", "--no-record", "--duration-s", "2"]);
+    let mut child = command.spawn().unwrap();
+    let begun = Instant::now();
+    drop((child.stdout.take(), child.stderr.take()));
+    assert!(child.wait().unwrap().success());
+    assert!(begun.elapsed() > Duration::from_secs(2));
+}
+
 #[test]
 fn a_recording_is_not_overwritten() {
     let root = tempfile::tempdir().unwrap();

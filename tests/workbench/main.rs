@@ -5,6 +5,7 @@
 mod amend_support;
 mod failsafes;
 mod own;
+mod reading;
 #[path = "../support/reconstruct.rs"]
 mod reconstruct_support;
 mod session;

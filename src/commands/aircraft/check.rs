@@ -41,9 +41,9 @@ struct Document<'a> {
 
 /// Checks the aircraft and prints the results. The exit status is 3 if something should be corrected before a flight.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
-    arguments.json.writable(Overwrite::Never)?;
+    arguments.json.writable(Overwrite::New)?;
     if let Some(path) = &arguments.report {
-        files::writable(path, Overwrite::Never)?;
+        files::writable(path, Overwrite::New)?;
     }
     let model = given::model(&arguments.model)?;
     let found = aircraft_check::check(&model)?;
@@ -58,9 +58,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         print(&found);
     }
     let document = Document { model: &model.name, airframe: &model.airframe.name, found: &found };
-    arguments.json.write("greylag.aircraft-check/1", &document, Overwrite::Never)?;
+    arguments.json.write("greylag.aircraft-check/1", &document, Overwrite::New)?;
     if let Some(path) = &arguments.report {
-        files::write(path, &page(&arguments.model, &model)?, Overwrite::Never)?;
+        files::write(path, &page(&arguments.model, &model)?, Overwrite::New)?;
     }
     Ok(status(&found))
 }

@@ -49,6 +49,8 @@ pub struct Arguments {
 /// Draws the aircraft, prints the quantiles of their traits and writes their files.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let population = Population::load(&shipped(&arguments.population))?;
+    // errors of the options are reported before the first draw is written
+    let placed = placed(arguments)?;
     let mut characters = Vec::new();
     let mut shown = listing();
     for number in 0..u64::from(arguments.count) {
@@ -65,23 +67,33 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if arguments.show > 0 {
         println!("{shown}\n");
     }
-    let given: Vec<PathBuf> = match arguments.models.is_empty() {
-        true => SHIPPED.map(PathBuf::from).to_vec(),
-        false => arguments.models.clone(),
-    };
-    let models = given.iter().map(|p| GreyBox::load(&shipped(p))).collect::<Result<Vec<_>, _>>()?;
-    print(&characters, &models)?;
+    print(&characters, &placed);
     if let Some(folder) = &arguments.out {
         println!("wrote {} aircraft below {}", arguments.count, folder.display());
     }
     Ok(ExitCode::SUCCESS)
 }
 
+/// The models to compare with the draws, and their traits.
+fn placed(arguments: &Arguments) -> Result<Vec<(GreyBox, Character)>> {
+    let given: Vec<PathBuf> = match arguments.models.is_empty() {
+        true => SHIPPED.map(PathBuf::from).to_vec(),
+        false => arguments.models.clone(),
+    };
+    let place = |path: &PathBuf| -> Result<(GreyBox, Character)> {
+        let model = GreyBox::load(&shipped(path))?;
+        let own = Character::of(&model)
+            .with_context(|| format!("cannot place {}", model.airframe.name))?;
+        Ok((model, own))
+    };
+    given.iter().map(place).collect()
+}
+
 fn write(folder: &Path, drawn: &Drawn) -> Result<()> {
     std::fs::create_dir_all(folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     for (name, text) in ["airframe.toml", "model.toml"].iter().zip(&drawn.files) {
-        files::write(&folder.join(name), text, Overwrite::Never)?;
+        files::write(&folder.join(name), text, Overwrite::New)?;
     }
     Ok(())
 }
@@ -119,24 +131,20 @@ fn listed(drawn: &Drawn) -> Vec<String> {
     ]
 }
 
-/// Prints the quantiles of each trait and the values of `models`. Then prints the traits in which a model lies outside
-/// the draws.
-fn print(characters: &[Character], models: &[GreyBox]) -> Result<()> {
-    let own = models
-        .iter()
-        .map(|m| Character::of(m).with_context(|| format!("cannot place {}", m.airframe.name)))
-        .collect::<Result<Vec<_>>>()?;
+/// Prints the quantiles of each trait and the values of the models `placed`. Then prints the traits in which a model
+/// lies outside the draws.
+fn print(characters: &[Character], placed: &[(GreyBox, Character)]) {
     let mut table = Table::new();
     table.load_style(NOTHING);
-    let names = models.iter().map(|m| m.airframe.name.clone());
+    let names = placed.iter().map(|(model, _)| model.airframe.name.clone());
     table.set_header(["", "0.5 %", "median", "99.5 %"].map(String::from).into_iter().chain(names));
-    let mut outside = vec![Vec::new(); models.len()];
+    let mut outside = vec![Vec::new(); placed.len()];
     for (k, about) in TRAITS.iter().enumerate() {
         let all: Vec<f64> = characters.iter().map(|c| c.values[k]).collect();
         let [low, high] = INSIDE.map(|q| quantile(&all, q));
         let mut row = vec![about.name.to_owned()];
         row.extend([low, quantile(&all, 0.5), high].map(number));
-        for (character, out) in own.iter().zip(&mut outside) {
+        for ((_, character), out) in placed.iter().zip(&mut outside) {
             let value = character.values[k];
             let inside = (low..=high).contains(&value);
             row.push(number(value) + if inside { "" } else { " !" });
@@ -150,13 +158,12 @@ fn print(characters: &[Character], models: &[GreyBox]) -> Result<()> {
     for about in &TRAITS {
         println!("{}: {}", about.name, about.meaning);
     }
-    for (model, out) in models.iter().zip(outside) {
+    for ((model, _), out) in placed.iter().zip(outside) {
         match out.is_empty() {
             true => println!("{} lies among the draws", model.airframe.name),
             false => println!("{} lies outside in {}", model.airframe.name, out.join(", ")),
         }
     }
-    Ok(())
 }
 
 /// Formats `value` with about three significant figures.
@@ -166,5 +173,26 @@ fn number(value: f64) -> String {
         x if x >= 10.0 => format!("{value:.1}"),
         x if x >= 1.0 => format!("{value:.2}"),
         _ => format!("{value:.3}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrong_model_is_reported_before_a_draw_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("draws");
+        let arguments = Arguments {
+            population: "params/any/aircraft.toml".into(),
+            seed: 1,
+            count: 1,
+            show: 0,
+            models: vec!["missing.toml".into()],
+            out: Some(out.clone()),
+        };
+        assert!(run(&arguments).is_err());
+        assert!(!out.exists());
     }
 }

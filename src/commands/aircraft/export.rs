@@ -52,7 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     std::fs::create_dir_all(&engines)
         .with_context(|| format!("cannot make the folder {}", engines.display()))?;
     for (path, text) in &exported.files {
-        files::write(&folder.join(path), text, Overwrite::Never)?;
+        files::write(&folder.join(path), text, Overwrite::New)?;
     }
     println!("wrote {}", folder.join(format!("{name}.xml")).display());
     exported.left_out.iter().for_each(|what| println!("left out: {what}"));

@@ -53,7 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     let measures = new::measures(common, folder, *span_m, *area_m2)?;
     let prior = folder.join("prior");
-    let made = !folder.exists();
+    let made = [folder, &prior].map(|path| !path.exists());
     new::files(&prior, &measures.airframe(), &measures.model())?;
     let model = prior.join("model.toml");
     let fitted = folder.join("model.toml");
@@ -67,8 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     line.extend(["--report".into(), folder.join("fit.html").into_os_string()]);
     let Command::Amend(amend) = command_of(&line)? else { bail!("greylag amend cannot be run") };
     let status = crate::commands::amend::run(&amend).inspect_err(|_| {
-        // the folder must not exist when the corrected command is run again
-        let _ = std::fs::remove_dir_all(if made { folder } else { &prior });
+        remove(folder, &prior, made);
     })?;
     if !fitted.exists() {
         println!("the model estimated from the dimensions is in {}", prior.display());
@@ -76,22 +75,29 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     let page = folder.join("aircraft.html");
     let found = check::page(&fitted, &given::model(&fitted)?)?;
-    files::write(&page, &found, Overwrite::Never)?;
+    files::write(&page, &found, Overwrite::New)?;
     println!("wrote {} and {}", page.display(), folder.join("fit.html").display());
     next(folder, &fitted)?;
     Ok(status)
+}
+
+/// Removes what a failed run wrote, so that the corrected command can be run again. `made` says whether the run made
+/// `folder` and `prior`: a folder that was there before keeps its other files.
+fn remove(folder: &Path, prior: &Path, made: [bool; 2]) {
+    let _ = match made {
+        [true, _] => std::fs::remove_dir_all(folder),
+        [false, true] => std::fs::remove_dir_all(prior),
+        [false, false] => ["airframe.toml", "model.toml"]
+            .iter()
+            .try_for_each(|name| std::fs::remove_file(prior.join(name))),
+    };
 }
 
 /// Recommends manoeuvres for the coefficients that the flights do not determine.
 fn next(folder: &Path, fitted: &Path) -> Result<()> {
     let text = std::fs::read_to_string(folder.join("amend.json"))?;
     let story: serde_json::Value = serde_json::from_str(&text)?;
-    let all = story["parameters"].as_array().into_iter().flatten();
-    let unknown = all.filter_map(|p| {
-        let (value, sd) = (p["value"].as_f64()?, p["sd"].as_f64()?);
-        (sd > KNOWN * value.abs()).then(|| p["name"].as_str().unwrap_or_default().to_owned())
-    });
-    let unknown: Vec<String> = unknown.collect();
+    let unknown = unknown(&story);
     let mut said: Vec<(&str, Vec<&str>)> = Vec::new();
     for name in &unknown {
         let of = MANOEUVRES.iter().find(|(effect, _)| name.starts_with(effect));
@@ -119,4 +125,47 @@ fn next(folder: &Path, fitted: &Path) -> Result<()> {
         quoted(fitted)
     );
     Ok(())
+}
+
+/// Names of the coefficients that the flights do not determine. A standard deviation that is no finite number is `null`
+/// in the file: nothing is known of its coefficient.
+fn unknown(story: &serde_json::Value) -> Vec<String> {
+    let all = story["parameters"].as_array().into_iter().flatten();
+    let unknown = all.filter(|p| match (p["value"].as_f64(), p["sd"].as_f64()) {
+        (Some(value), Some(sd)) => sd > KNOWN * value.abs(),
+        _ => true,
+    });
+    unknown.map(|p| p["name"].as_str().unwrap_or_default().to_owned()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_coefficient_without_a_standard_deviation_is_not_known() {
+        let story = serde_json::json!({ "parameters": [
+            { "name": "drag_linear.CD0", "value": 0.02, "sd": 0.001 },
+            { "name": "roll_linear.Clp", "value": -0.4, "sd": 0.2 },
+            { "name": "yaw_linear.Cnr", "value": -0.1, "sd": null },
+        ] });
+        assert_eq!(unknown(&story), ["roll_linear.Clp", "yaw_linear.Cnr"]);
+    }
+
+    #[test]
+    fn a_failed_run_leaves_the_files_that_were_there() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = root.path().join("own");
+        let prior = folder.join("prior");
+        std::fs::create_dir_all(&prior).unwrap();
+        std::fs::write(prior.join("notes.txt"), "mine").unwrap();
+        let words =
+            ["aircraft", "from-log", "--mass-kg", "3.4", "--span-m", "2.1", "--area-m2", "0.75"];
+        let mut line: Vec<OsString> = words.map(Into::into).into();
+        line.extend([folder.into_os_string(), "--log".into(), "no-such-log.csv".into()]);
+        let command = command_of(&line).unwrap();
+        assert!(crate::commands::run(command).is_err());
+        let left = std::fs::read_dir(&prior).unwrap().map(|e| e.unwrap().file_name());
+        assert_eq!(left.collect::<Vec<_>>(), ["notes.txt"]);
+    }
 }

@@ -14,6 +14,9 @@ use crate::control::aircraft_check;
 use crate::model::GreyBox;
 use crate::sim::import::{Imported, import};
 
+/// Cruise airspeeds are below this, m/s.
+const FASTEST_MPS: f64 = 1000.0;
+
 /// The arguments of `greylag aircraft import jsbsim`.
 #[derive(Args)]
 pub struct Jsbsim {
@@ -41,11 +44,18 @@ pub struct Jsbsim {
 
 /// Imports the aircraft, writes its files and lists the effects that they do not represent.
 pub fn run(jsbsim: &Jsbsim) -> Result<ExitCode> {
+    let (cruise, altitude) = (jsbsim.cruise_mps, jsbsim.altitude_m);
+    if !(cruise > 0.0 && cruise < FASTEST_MPS && altitude.is_finite()) {
+        bail!(
+            "--cruise-mps {cruise} and --altitude-m {altitude}: give an airspeed above 0 and below {FASTEST_MPS} m/s, \
+             and a finite altitude"
+        );
+    }
     let mut options = PlantOptions {
         aircraft_dir: Some(jsbsim.dir.clone()),
         aircraft: jsbsim.name.clone(),
         held: jsbsim.set.clone(),
-        start: Start { airspeed_mps: jsbsim.cruise_mps, ..Start::NEUTRAL },
+        start: Start { airspeed_mps: cruise, ..Start::NEUTRAL },
         ..PlantOptions::default()
     };
     for (key, name) in &jsbsim.property {
@@ -64,13 +74,13 @@ pub fn run(jsbsim: &Jsbsim) -> Result<ExitCode> {
         println!("give these to `greylag evaluate` and `greylag-sitl`, which fly it");
         steering.notes.iter().for_each(|note| println!("note: {note}"));
     }
-    let mut found = import(&mut plant, &jsbsim.name, jsbsim.cruise_mps, jsbsim.altitude_m)?;
+    let mut found = import(&mut plant, &jsbsim.name, cruise, altitude)?;
     found.hold(&jsbsim.set);
     let read = read_back(&found)?;
     std::fs::create_dir_all(out)
         .with_context(|| format!("cannot make the folder {}", out.display()))?;
-    files::write(&out.join("airframe.toml"), &found.airframe, Overwrite::Never)?;
-    files::write(&model, &found.model, Overwrite::Never)?;
+    files::write(&out.join("airframe.toml"), &found.airframe, Overwrite::New)?;
+    files::write(&model, &found.model, Overwrite::New)?;
     println!("wrote {} and airframe.toml beside it", model.display());
     found.left_out.iter().for_each(|what| println!("left out: {what}"));
     super::check::print(&aircraft_check::check(&read)?);
@@ -84,4 +94,26 @@ fn read_back(found: &Imported) -> Result<GreyBox> {
     std::fs::write(folder.path().join("airframe.toml"), &found.airframe)?;
     std::fs::write(&model, &found.model)?;
     GreyBox::load(&model).context("what was imported is no model that Greylag can read")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cruise_airspeed_is_a_positive_number() {
+        for cruise_mps in [f64::NAN, f64::INFINITY, 0.0, -20.0] {
+            let jsbsim = Jsbsim {
+                dir: "missing".into(),
+                name: "x8".into(),
+                out: "missing/out".into(),
+                cruise_mps,
+                altitude_m: 600.0,
+                property: Vec::new(),
+                set: Vec::new(),
+            };
+            let error = run(&jsbsim).unwrap_err().to_string();
+            assert!(error.contains("--cruise-mps"), "{error}");
+        }
+    }
 }

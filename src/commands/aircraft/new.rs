@@ -121,8 +121,8 @@ pub fn files(folder: &Path, airframe: &str, model_text: &str) -> Result<PathBuf>
     if model.exists() {
         bail!("{} exists; name another folder", model.display());
     }
-    files::write(&folder.join("airframe.toml"), &airframe, Overwrite::Never)?;
-    files::write(&model, model_text, Overwrite::Never)?;
+    files::write(&folder.join("airframe.toml"), &airframe, Overwrite::New)?;
+    files::write(&model, model_text, Overwrite::New)?;
     Ok(model)
 }
 

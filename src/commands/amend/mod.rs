@@ -9,7 +9,7 @@ mod tables;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 
 use places::{Places, hashed};
 use tables::print;
@@ -112,7 +112,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some(path) = &arguments.report {
         files::writable(path, overwrite)?;
     }
-    let places = Places::new(&path, &arguments.out, overwrite)?;
+    let places = Places::new(&path, &model, &arguments.out, overwrite)?;
     distinct(&arguments.logs.paths, &arguments.hold_out)?;
     let effects = named_effects(&arguments.effects)?;
     check_new(&effects, &model)?;
@@ -161,7 +161,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// Why the fit is not written, in a sentence. With `--fit-all` no flight can show what is chance.
+/// The reason why the fit is not written, in a sentence; `None` if it is written. With `--fit-all` no flight is held
+/// out, so an improvement by chance cannot be detected.
 fn given_is_kept(arguments: &Arguments, story: &Amendment) -> Option<String> {
     let by_chance = || story.by_chance().filter(|_| !arguments.fit_all);
     story.worse().or_else(by_chance).filter(|_| !arguments.accept_anyway)
@@ -195,7 +196,10 @@ fn doubtful(story: &Amendment) -> bool {
 /// Carries out `--leave-one-out`: prints a table of structures and writes no model.
 fn structures(arguments: &Arguments, model: &GreyBox) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
-    std::fs::create_dir_all(&arguments.out)?;
+    // a copy of the flight that is left out would be fitted to
+    distinct(&arguments.logs.paths, &[])?;
+    std::fs::create_dir_all(&arguments.out)
+        .with_context(|| format!("cannot make the folder {}", arguments.out.display()))?;
     let json = arguments.out.join("leave-one-out.json");
     files::writable(&json, overwrite)?;
     let effects = named_effects(&arguments.effects)?;
@@ -353,4 +357,27 @@ fn wanted(
         }
     }
     Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::{Command, command_of};
+
+    #[test]
+    fn a_flight_that_is_left_out_is_in_no_copy() {
+        let folder = tempfile::tempdir().unwrap();
+        let [one, copy] = ["a.csv", "copy.csv"].map(|name| folder.path().join(name));
+        for path in [&one, &copy] {
+            std::fs::write(path, "1").unwrap();
+        }
+        let out = folder.path().join("out");
+        let words = ["amend", "--tune-only", "--leave-one-out", "--model", "params/x8/prior.toml"];
+        let mut line: Vec<std::ffi::OsString> = words.map(Into::into).into();
+        line.extend(["--log".into(), one.into_os_string(), copy.into_os_string()]);
+        line.extend(["--out".into(), out.clone().into_os_string()]);
+        let Ok(Command::Amend(arguments)) = command_of(&line) else { panic!("no amendment") };
+        let error = run(&arguments).unwrap_err().to_string();
+        assert!(error.contains("hold the same flight") && !out.exists(), "{error}");
+    }
 }

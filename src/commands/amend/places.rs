@@ -40,8 +40,22 @@ impl Drop for Places {
 }
 
 impl Places {
-    /// Reads the model file and makes the folder. Fails at once if a result could not be written after the fit.
-    pub fn new(original: &Path, folder: &Path, overwrite: Overwrite) -> Result<Places> {
+    /// Reads the model file `original` of `model` and makes the folder. Fails at once if a result could not be
+    /// written after the fit.
+    pub fn new(
+        original: &Path,
+        model: &GreyBox,
+        folder: &Path,
+        overwrite: Overwrite,
+    ) -> Result<Places> {
+        if model.residual.is_some() {
+            // the written model would lack the residual's file
+            bail!(
+                "model {} has a learned residual, which amend does not write: amend its prior, then learn the residual \
+                 again",
+                model.name
+            );
+        }
         let (read, made) = (Original::read(original)?, !folder.exists());
         fs::create_dir_all(folder).with_context(|| {
             format!("cannot make the folder {}; name another one", folder.display())
@@ -93,4 +107,18 @@ impl Places {
 /// Whether the file at `path` exists with this text.
 fn holds(path: &Path, text: &str) -> bool {
     fs::read_to_string(path).is_ok_and(|there| there == text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_model_with_a_residual_is_refused_before_the_fit() {
+        let out = tempfile::tempdir().unwrap().path().join("out");
+        let file = Path::new("params/x8/learned/model.toml");
+        let model = GreyBox::load(file).unwrap();
+        let error = Places::new(file, &model, &out, Overwrite::New).err().unwrap().to_string();
+        assert!(error.contains("residual") && !out.exists(), "{error}");
+    }
 }

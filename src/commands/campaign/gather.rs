@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 
 use super::Which;
 use crate::campaign::gather::{Gathered, Joined, gather, read_lines, write_lines};
@@ -37,6 +37,9 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite: Overwrite = arguments.force.into();
     for path in arguments.results.iter().chain(&arguments.times) {
+        if files::is_stdout(Some(path)) {
+            bail!("--results and --times name files; standard output holds the list of the cells");
+        }
         files::writable(path, overwrite)?;
     }
     let (plan, store) = arguments.which.open()?;
@@ -98,5 +101,18 @@ pub fn print_unfinished(all: &Gathered) {
         if cells.len() > NAMED {
             println!("{what}: {} more", cells.len() - NAMED);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn standard_output_is_no_file_of_results() {
+        let which = Which { file: "missing.toml".into(), out: None };
+        let results = Some("-".into());
+        let arguments = Arguments { which, results, times: None, join: Vec::new(), force: false };
+        assert!(run(&arguments).unwrap_err().to_string().contains("--results"));
     }
 }

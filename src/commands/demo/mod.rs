@@ -131,7 +131,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     };
     let report = reporter.report(&folder, &recorded)?;
     let page = folder.join("report.html");
-    files::write(&page, &report.page().render(), Overwrite::Never)?;
+    files::write(&page, &report.page().render(), Overwrite::New)?;
     println!("report: {}", page.display());
     println!("next: {}", report.next);
     Ok(verdict(&report, trouble.as_deref()))

@@ -66,8 +66,8 @@ pub(super) struct Flight {
     change: Option<&'static str>,
     /// `None` where no controller could be designed.
     minute: Option<Minute>,
-    /// Derivatives estimated in this flight over the aircraft's own, in the order of `DERIVATIVES`; `None` where they are
-    /// unknown. Empty after a change.
+    /// Ratios of the derivatives estimated in this flight to the aircraft's own, in the order of `DERIVATIVES`; `None`
+    /// for an unknown one. Empty after a change.
     pub(super) derivative_ratios: Vec<Option<f64>>,
 }
 
@@ -81,7 +81,7 @@ struct AnyDocument<'a> {
     flights: &'a [Flight],
 }
 
-/// Flies `count` drawn aircraft and those beside them, prints the tables, writes the JSON.
+/// Flies `count` drawn aircraft and those of `--beside`, prints the tables and writes the JSON.
 pub(super) fn fly(arguments: &Arguments, count: u32) -> Result<ExitCode> {
     let kinds = &arguments.controllers;
     if let Some(kind) =
@@ -199,7 +199,7 @@ fn of_controller(
     flight: [u64; 2],
     changes: &[Option<Changed>],
 ) -> Vec<Flight> {
-    // the design of an LQI takes longer than its flight
+    // designed once for all changes: the design of an LQI takes longer than its flight
     let mut controller = build(kind, from).ok();
     let mut fly = |changed: &Option<Changed>| {
         let mut estimator = AircraftEstimator::new(&exact.airframe);
@@ -239,9 +239,8 @@ fn after_changes(kinds: &[ControllerKind], before: &[Flight], after: &[Flight]) 
                 let flights: Vec<&Flight> = pairs.map(|(_, c)| c).collect();
                 let minutes: Vec<f64> =
                     flights.iter().filter_map(|f| Some(kept(f)?.settled_deg)).collect();
-                let share = 100.0 * minutes.len() as f64 / flights.len() as f64;
                 let mut row = [kind.name(), knows.name(), change.name()].map(String::from).to_vec();
-                row.extend([flights.len().to_string(), format!("{share:.1}")]);
+                row.extend([flights.len().to_string(), percent(minutes.len(), flights.len(), 1)]);
                 row.extend([0.5, 0.9].map(|q| match minutes.is_empty() {
                     true => "-".to_owned(),
                     false => format!("{:.2}", quantile(&minutes, q)),
@@ -286,6 +285,14 @@ fn summary(kinds: &[ControllerKind], flights: &[Flight]) -> Table {
     table
 }
 
+/// `some` of `all` in per cent; a dash if there are none, for example if every aircraft was lost.
+pub(super) fn percent(some: usize, all: usize, digits: usize) -> String {
+    match all {
+        0 => "-".into(),
+        _ => format!("{:.digits$}", 100.0 * some as f64 / all as f64),
+    }
+}
+
 pub(super) fn kept(flight: &Flight) -> Option<Minute> {
     flight.minute.filter(|m| m.lost_s.is_none())
 }
@@ -298,15 +305,14 @@ fn row([controller, knows]: [&str; 2], flights: &[&Flight], reference: &[&Flight
         .zip(reference)
         .filter_map(|(f, r)| Some(kept(f)?.integral_deg_s / kept(r)?.integral_deg_s))
         .collect();
-    let lost = 100.0 * (flights.len() - flown.len()) as f64 / flights.len() as f64;
+    let lost = percent(flights.len() - flown.len(), flights.len(), 1);
     let both = |all: &[f64], digits: usize| {
         [0.5, 0.9].map(|q| match all.is_empty() {
             true => "-".to_owned(),
             false => format!("{:.digits$}", quantile(all, q)),
         })
     };
-    let mut row =
-        vec![controller.into(), knows.into(), flights.len().to_string(), format!("{lost:.1}")];
+    let mut row = vec![controller.into(), knows.into(), flights.len().to_string(), lost];
     row.extend(both(&settled, 2));
     row.extend(both(&ratios, 2));
     row
@@ -329,4 +335,30 @@ fn one_by_one(flights: &[Flight]) -> Table {
         table.add_row(row);
     }
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_of_no_flights_is_a_dash() {
+        let kinds = [ControllerKind::Adaptive];
+        let tables = [after_changes(&kinds, &[], &[]), derivatives::table(&kinds, &[])];
+        for table in tables.map(|table| table.to_string()) {
+            assert!(table.contains("adaptive") && !table.contains("NaN"), "{table}");
+        }
+    }
+
+    #[test]
+    fn an_option_that_drawn_aircraft_ignore_is_refused() {
+        use clap::Parser;
+        let line = ["greylag", "evaluate", "--any", "2", "--controller", "lqi"];
+        let read =
+            |more: &[&str]| crate::commands::Arguments::try_parse_from([&line[..], more].concat());
+        assert!(read(&[]).is_ok());
+        for more in [["--envelope", "kept"], ["--planner", "horizon=5"], ["--model", "m.toml"]] {
+            assert!(read(&more).is_err(), "{more:?}");
+        }
+    }
 }

@@ -1,8 +1,8 @@
-//! The derivatives of drawn aircraft that a minute of flight reveals, beside the aircraft's own.
+//! Derivatives of drawn aircraft estimated from a minute of flight, compared with the aircraft's own.
 
 use comfy_table::Table;
 
-use super::any::{Flight, kept};
+use super::any::{Flight, kept, percent};
 use crate::control::ControllerKind;
 use crate::control::aircraft_estimate::{AircraftEstimator, DERIVATIVES};
 use crate::model::GreyBox;
@@ -10,7 +10,7 @@ use crate::model::population::{Character, TRAITS};
 use crate::num::statistics::quantile;
 use crate::physics::atmosphere::STANDARD_GRAVITY;
 
-/// The trait that is the magnitude of each derivative, and the power of V/g that makes it dimensionless.
+/// The trait that holds the magnitude of each derivative, and the power of V/g that makes it dimensionless.
 const MAGNITUDES: [(&str, i32); DERIVATIVES.len()] = [
     ("roll power", 2),
     ("roll damping", 1),
@@ -32,7 +32,8 @@ fn own(model: &GreyBox) -> Option<[f64; DERIVATIVES.len()]> {
     Some(own)
 }
 
-/// Estimated over own derivatives; `None` where the flight has not revealed one.
+/// Ratios of the estimated derivatives to the aircraft's own; `None` for a derivative that the flight does not
+/// determine. Empty for an aircraft that cannot be trimmed.
 pub(super) fn ratios(estimator: &AircraftEstimator, exact: &GreyBox) -> Vec<Option<f64>> {
     let Some(own) = own(exact) else { return Vec::new() };
     let all = estimator.derivatives().into_iter().zip(own);
@@ -52,7 +53,7 @@ pub(super) fn table(kinds: &[ControllerKind], flights: &[Flight]) -> Table {
             let known = own.iter().filter_map(|f| *f.derivative_ratios.get(k)?);
             let errors: Vec<f64> = known.map(|ratio| 100.0 * (ratio - 1.0).abs()).collect();
             let mut row = vec![kind.name().to_owned(), (*name).to_owned()];
-            row.push(format!("{:.0}", 100.0 * errors.len() as f64 / own.len() as f64));
+            row.push(percent(errors.len(), own.len(), 0));
             row.extend([0.5, 0.9].map(|q| match errors.is_empty() {
                 true => "-".to_owned(),
                 false => format!("{:.0}", quantile(&errors, q)),

@@ -12,6 +12,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::sim::faults::{Case, Cause, Fault, Finding, Found, Report, draw};
 
+/// Start of every line.
+const START: &str = "{\"controller\":";
+
 /// A flight of the campaign. Its faults follow from its seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
@@ -119,8 +122,10 @@ impl Ledger {
                 known.insert(entry.key(), entry);
                 line.clear();
             }
+            // the first line of a killed run may be cut off anywhere; another file must not be emptied for it
+            let cut = line.starts_with(START) || START.starts_with(&line);
             ensure!(
-                whole > 0 || line.is_empty() || line.starts_with('{'),
+                whole > 0 || cut,
                 "{} is not a file of `greylag faults --resume`, or one of an earlier version; give another name",
                 path.display()
             );
@@ -176,8 +181,15 @@ mod tests {
     fn another_file_is_left_alone() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("notes");
-        std::fs::write(&path, "something else").unwrap();
-        assert!(Ledger::open(&path).is_err());
-        assert_eq!(std::fs::read_to_string(&path).unwrap(), "something else");
+        for text in ["something else", "{\"counterpart\":\"px4\",\"seed\":3}", "{}"] {
+            std::fs::write(&path, text).unwrap();
+            assert!(Ledger::open(&path).is_err());
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+        }
+        let cut = "{\"controller\":\"lqi\",\"counter";
+        for length in [0, 1, 5, START.len(), cut.len()] {
+            std::fs::write(&path, &cut[..length]).unwrap();
+            assert!(Ledger::open(&path).unwrap().known.is_empty());
+        }
     }
 }

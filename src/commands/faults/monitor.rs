@@ -15,8 +15,9 @@ const FALSE_ALARMS: f64 = 1.0 / 40.0;
 /// Flies and prints a table. The exit status is 1 if too many healthy flights raised an alarm.
 ///
 /// # Errors
-/// If the aircraft cannot be built.
+/// If the aircraft cannot be built, or a seed would exceed 64 bits.
 pub fn run(factory: &CompanionFactory, first: u64, flights: u64) -> Result<ExitCode> {
+    let seeds = super::seeds(first, flights)?;
     let [roll, pitch, heading] = ATTITUDE_DEG;
     println!(
         "{flights} flights of 60 s each with a simulated ArduPlane, attitude off by up to {roll} deg in roll, {pitch} in pitch, \
@@ -27,10 +28,8 @@ pub fn run(factory: &CompanionFactory, first: u64, flights: u64) -> Result<ExitC
     table.set_header(["aircraft", "engaged", "false alarms", "found", "delay, median", "90 %"]);
     let mut alarmed = 0;
     for failure in Failure::ALL {
-        let watched: Result<Vec<Watched>, _> = (first..first + flights)
-            .into_par_iter()
-            .map(|seed| factory.watched(seed, failure))
-            .collect();
+        let watched: Result<Vec<Watched>, _> =
+            seeds.clone().into_par_iter().map(|seed| factory.watched(seed, failure)).collect();
         let watched = watched?;
         let alarms: usize = watched.iter().map(|w| w.false_alarms(failure)).sum();
         if failure == Failure::None {

@@ -53,7 +53,7 @@ pub(super) fn run(search_for: &Search) -> Result<ExitCode> {
     })?;
     drop(bar);
     let rows = found.iter().map(row).collect();
-    json.write("greylag.faults.search/1", &Document { seed, policies: rows }, Overwrite::Never)?;
+    json.write("greylag.faults.search/1", &Document { seed, policies: rows }, Overwrite::New)?;
     if !json.takes_stdout() {
         print(&found);
     }

@@ -19,6 +19,7 @@ use crate::commands::files::{command_line, shipped};
 use crate::commands::interruption::{Ended, Interruption};
 use crate::commands::train::share;
 use crate::learn::trainable;
+use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::model::residual::hash;
 use budget::{Algorithm, Budget};
@@ -321,7 +322,7 @@ fn flying(folder: &Path) -> Result<PathBuf> {
 /// The options with which a command flies the controller in `folder`.
 fn options(folder: &Path) -> String {
     let [model, policy] = ["model.toml", plan::POLICY].map(|name| folder.join(name));
-    format!("--model {} --policy {}", model.display(), policy.display())
+    format!("--model {} --policy {}", quoted(&model), quoted(&policy))
 }
 
 fn scores(reached: &[Reached]) -> Table {
@@ -365,6 +366,12 @@ mod tests {
     fn reached(controller: &str, divergence_rate: f64) -> Reached {
         let (easy_deg, hard_deg) = (0.2, 1.0);
         Reached { controller: controller.into(), targets: 40, easy_deg, hard_deg, divergence_rate }
+    }
+
+    #[test]
+    fn a_folder_with_a_space_stays_one_word() {
+        let words = options(Path::new("my aircraft"));
+        assert_eq!(words, "--model 'my aircraft/model.toml' --policy 'my aircraft/policy'");
     }
 
     #[test]

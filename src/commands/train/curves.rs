@@ -92,7 +92,7 @@ fn training(folder: &Path) -> Result<Training> {
         .map_or_else(|| folder.display().to_string(), |n| n.to_string_lossy().into());
     let mut seeds = Vec::new();
     if folder.join(CURVE).exists() {
-        seeds.push((0, folder.to_owned()));
+        seeds.push((None, folder.to_owned()));
     } else {
         let entries =
             folder.read_dir().with_context(|| format!("cannot read {}", folder.display()))?;
@@ -104,7 +104,8 @@ fn training(folder: &Path) -> Result<Training> {
                 .strip_prefix(SEED)
                 .and_then(|s| s.parse::<u64>().ok());
             seeds.extend(
-                seed.filter(|_| entry.path().join(CURVE).exists()).map(|s| (s, entry.path())),
+                seed.filter(|_| entry.path().join(CURVE).exists())
+                    .map(|seed| (Some(seed), entry.path())),
             );
         }
     }
@@ -112,7 +113,8 @@ fn training(folder: &Path) -> Result<Training> {
     let mut read = Vec::new();
     for (seed, folder) in seeds {
         let points = learning_curve::read(&folder.join(CURVE))?;
-        let seed = if seed == 0 { "–".into() } else { seed.to_string() };
+        // a folder of one seed does not say which
+        let seed = seed.map_or("–".into(), |seed| seed.to_string());
         if !points.is_empty() {
             read.push((seed, points));
         }
@@ -125,4 +127,26 @@ fn training(folder: &Path) -> Result<Training> {
         );
     }
     Ok(Training { name, seeds: read })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learn::policy::learning_curve::COLUMNS;
+
+    #[test]
+    fn the_seed_zero_has_a_folder_like_the_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let curve = |easy_deg: f64| format!("{COLUMNS}\n1,1,1,{easy_deg},2,0,1,1,1,0\n");
+        for (seed, easy_deg) in [(0, 1.0), (1, 5.0)] {
+            let own = folder.path().join(format!("{SEED}{seed}"));
+            std::fs::create_dir(&own).unwrap();
+            std::fs::write(own.join(CURVE), curve(easy_deg)).unwrap();
+        }
+        let read = [training(folder.path()).unwrap()];
+        let seeds: Vec<&str> = read[0].seeds.iter().map(|(seed, _)| seed.as_str()).collect();
+        assert_eq!(seeds, ["0", "1"]);
+        let next = next(&[folder.path().to_owned()], &read);
+        assert!(next.ends_with("seed-0"), "{next}");
+    }
 }

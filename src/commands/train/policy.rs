@@ -157,9 +157,12 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     if arguments.start.is_some() && !arguments.is_analytic() {
         bail!("--start trains an actor further by --algorithm analytic; TD3 begins with its own");
     }
+    let end = arguments.seed.checked_add(arguments.seeds);
+    let end =
+        end.with_context(|| format!("--seed {} leaves no room for --seeds", arguments.seed))?;
+    let seeds = arguments.seed..end;
     println!("{:>8} {COLUMNS}", "seed");
     let one = |seed: u64| arguments.train(&ground, seed, stop);
-    let seeds = arguments.seed..arguments.seed + arguments.seeds;
     // a scheduler limits the number of cores by RAYON_NUM_THREADS
     let pool = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads()).build()?;
     use rayon::prelude::*;
@@ -292,5 +295,21 @@ impl Arguments {
             #[cfg(not(feature = "demo"))]
             None => Err(anyhow::anyhow!("this program was built without JSBSim")),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::{Command, command_of};
+
+    #[test]
+    fn seeds_beyond_the_largest_number_are_refused() {
+        let words = ["train", "policy", "--env", "model:params/x8/learned", "--out", "unused"];
+        let more = ["--seed", "18446744073709551615", "--seeds", "2"];
+        let line: Vec<_> = words.iter().chain(&more).map(std::ffi::OsString::from).collect();
+        let Ok(Command::Train(train)) = command_of(&line) else { panic!("no training") };
+        let error = crate::commands::train::learn(&train, &Interruption::default()).unwrap_err();
+        assert!(error.to_string().contains("--seed"), "{error}");
     }
 }

@@ -3,6 +3,7 @@
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Largest number of output lines kept.
@@ -18,6 +19,8 @@ pub struct Program {
     input: Option<ChildStdin>,
     stop_requested: Option<Instant>,
     output: [Arc<Mutex<Vec<String>>>; 2],
+    /// Threads that read the output.
+    listeners: Vec<JoinHandle<()>>,
 }
 
 impl Program {
@@ -26,18 +29,21 @@ impl Program {
     /// # Errors
     /// If the operating system cannot start the process.
     pub fn start(words: &[String]) -> std::io::Result<Program> {
-        let mut child = Command::new(std::env::current_exe()?)
-            .args(words)
-            .arg("--attached")
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()?;
+        let mut command = Command::new(std::env::current_exe()?);
+        command.args(words).arg("--attached");
+        Program::of(command)
+    }
+
+    /// Starts `command` and reads its output.
+    fn of(mut command: Command) -> std::io::Result<Program> {
+        let command = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn()?;
         let output: [Arc<Mutex<Vec<String>>>; 2] = Default::default();
-        listen(child.stdout.take(), &output[0]);
-        listen(child.stderr.take(), &output[1]);
+        let listeners =
+            [listen(child.stdout.take(), &output[0]), listen(child.stderr.take(), &output[1])];
+        let listeners = listeners.into_iter().flatten().collect();
         let input = child.stdin.take();
-        Ok(Program { child, input, stop_requested: None, output })
+        Ok(Program { child, input, stop_requested: None, output, listeners })
     }
 
     /// Requests the end of the flight by closing the program's input.
@@ -46,12 +52,16 @@ impl Program {
         self.stop_requested.get_or_insert_with(Instant::now);
     }
 
-    /// Exit status; `None` while the program runs. The program is killed [`STOP_TIMEOUT`] after the stop request.
+    /// Exit status; `None` while the program runs. The program is killed [`STOP_TIMEOUT`] after the stop request. Its
+    /// output is complete when there is a status.
     pub fn ended(&mut self) -> Option<ExitStatus> {
         if self.stop_requested.is_some_and(|at| at.elapsed() > STOP_TIMEOUT) {
             let _ = self.child.kill();
         }
-        self.child.try_wait().ok().flatten()
+        let status = self.child.try_wait().ok().flatten()?;
+        // the last lines may still be in the pipes, which the end of the process has closed
+        self.listeners.drain(..).for_each(|listener| drop(listener.join()));
+        Some(status)
     }
 
     /// Whether the flight reached its planned end.
@@ -83,14 +93,32 @@ impl Drop for Program {
 }
 
 /// Keeps the last [`LINES`] lines of `from` in `output`, on a separate thread.
-fn listen(from: Option<impl Read + Send + 'static>, output: &Arc<Mutex<Vec<String>>>) {
-    let (Some(from), output) = (from, output.clone()) else { return };
-    std::thread::spawn(move || {
+fn listen(
+    from: Option<impl Read + Send + 'static>,
+    output: &Arc<Mutex<Vec<String>>>,
+) -> Option<JoinHandle<()>> {
+    let (from, output) = (from?, output.clone());
+    Some(std::thread::spawn(move || {
         for line in BufReader::new(from).lines().map_while(Result::ok) {
             let mut lines = output.lock().unwrap_or_else(PoisonError::into_inner);
             lines.push(line);
             let old = lines.len().saturating_sub(LINES);
             lines.drain(..old);
         }
-    });
+    }))
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_output_is_complete_at_the_end() {
+        let mut command = Command::new("sh");
+        command.args(["-c", "seq 20000; echo 'report: page.html'; echo tracked"]);
+        let mut program = Program::of(command).unwrap();
+        while program.ended().is_none() {}
+        assert!(program.is_whole());
+        assert_eq!(program.last_line(), "tracked");
+    }
 }
