@@ -264,10 +264,16 @@ fn next(arguments: &Arguments, evaluations: &[Evaluation], plant: &PlantOptions)
 
 /// Description of the evaluation in one line.
 fn subtitle(arguments: &Arguments) -> String {
+    let groups: Vec<&str> = arguments.groups.iter().map(|group| group.name()).collect();
+    let groups = match groups.is_empty() {
+        true => String::new(),
+        false => format!(" ({})", groups.join(", ").replace('_', " ")),
+    };
+    let path = arguments.targets.display();
     let targets = match (arguments.no_targets, arguments.every) {
         (true, _) => Vec::new(),
-        (false, 1) => vec![format!("targets of {}", arguments.targets.display())],
-        (false, n) => vec![format!("targets of {}, one in {n}", arguments.targets.display())],
+        (false, 1) => vec![format!("targets of {path}{groups}")],
+        (false, n) => vec![format!("targets of {path}{groups}, one in {n}")],
     };
     let steps =
         (arguments.steps > 0).then(|| format!("{} steps between attitudes", arguments.steps));

@@ -77,10 +77,6 @@ impl AircraftReport<'_> {
                 number(v)
             )
         }));
-        details.push(format!(
-            "Next: fly it, then fit it: greylag amend --model {} --log FLIGHTS --tune-only --out FOLDER",
-            self.model_file
-        ));
         let flies = format!(
             "flies straight from {} to {} m/s",
             number(envelope.airspeed_min_mps),
@@ -88,18 +84,27 @@ impl AircraftReport<'_> {
         );
         match findings.split_first() {
             None => Verdict {
-                outcome: Outcome::Reached,
+                outcome: Outcome::Sound,
                 reason: String::new(),
                 sentence: format!("It {flies}; nothing needs correction."),
-                details,
-                next: String::new(),
+                details: [
+                    "Fly it; then fit it to the logs of its flights (FLIGHTS) in a new FOLDER."
+                        .to_string(),
+                ]
+                .into_iter()
+                .chain(details)
+                .collect(),
+                next: format!(
+                    "greylag amend --model {} --log FLIGHTS --tune-only --out FOLDER",
+                    self.model_file
+                ),
             },
             Some((first, rest)) => Verdict {
-                outcome: Outcome::Missed,
+                outcome: Outcome::Faulty,
                 reason: String::new(),
                 sentence: format!("To correct before a flight: {first}."),
                 details: rest.iter().cloned().chain(details).collect(),
-                next: String::new(),
+                next: format!("greylag aircraft check --model {}", self.model_file),
             },
         }
     }

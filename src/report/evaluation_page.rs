@@ -92,7 +92,8 @@ impl EvaluationReport<'_> {
         });
         let note = "Interquartile mean of the settled error (mean of roll and pitch RMSE over the last fifth \
                     of ten seconds) with its 95 % bootstrap interval, over the targets here, over ten \
-                    policies in the paper (Table XI: true frozen prior), on a scale of decades.";
+                    policies in the paper (Table XI: true frozen prior), on a scale of decades. \
+                    The box has the plain mean.";
         Section::new("Settled error", note, figures.collect())
     }
 
@@ -299,7 +300,9 @@ mod tests {
             "{said:?}"
         );
         assert!(
-            said[0].ends_with("leaving the envelope more often: lqi (exact <model>) 0.00200°."),
+            said[0].ends_with(
+                "since they leave the envelope more often: lqi (exact <model>) 0.00200°."
+            ),
             "{said:?}"
         );
         // a controller that leaves the envelope in up to one flight in twenty keeps its rank

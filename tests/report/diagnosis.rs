@@ -178,7 +178,10 @@ fn hostile_text_stays_text() {
         c.refused = vec![hostile.into()];
         c.channels = vec![hostile.into()];
         c.indistinguishable_from = vec![hostile.into()];
-        c.parameters.iter_mut().for_each(|p| (p.name, p.unit) = (hostile.into(), hostile.into()));
+        for p in &mut c.parameters {
+            (p.name, p.unit) = (hostile.into(), hostile.into());
+            p.by_flight.iter_mut().for_each(|f| f.flight = hostile.into());
+        }
         c.by_flight.iter_mut().for_each(|f| f.flight = hostile.into());
         for curve in c.curve.iter_mut() {
             (curve.channel, curve.variable, curve.unit) =
@@ -222,9 +225,26 @@ fn the_box_says_where_the_tuned_model_fails() {
     d.verdict = Verdict::Adequate;
     d.effects.iter_mut().for_each(|c| c.asserted = false);
     let none = said(&d);
-    assert!(none.contains("nowhere clearly; tuned, it leaves most of lift, 18.2 %"), "{none}");
+    assert!(
+        none.contains("nowhere clearly; 18.2 % of lift is the most left after tuning"),
+        "{none}"
+    );
     assert!(none.find(&answer.effect) < none.find(&answer.error));
     assert!(none.contains("The nearest suspects, none of them shown"));
+}
+
+/// The parameter on which the flights differ most stands first, whatever its place in the effect.
+#[test]
+fn the_parameter_on_which_the_flights_differ_comes_first() {
+    let mut d = report_diagnosis::diagnosis();
+    let stall = d.effects.iter_mut().find(|c| c.id == "lift_stall").unwrap();
+    let mut apart = stall.parameters[0].by_flight.clone();
+    apart.iter_mut().zip([40.0, 52.0, 70.0]).for_each(|(f, value)| (f.value, f.sd) = (value, 1.0));
+    stall.parameters[1].by_flight = apart;
+    let html = page(&d).render();
+    let (_, agree) = html.split_once("<h2>Do the flights agree?</h2>").unwrap();
+    let [first, second] = ["lift_stall: M", "lift_stall: alpha"].map(|title| agree.find(title));
+    assert!(first.is_some() && first < second, "{first:?} {second:?}");
 }
 
 #[test]
@@ -251,7 +271,10 @@ fn a_diagnosis_that_found_nothing_is_still_a_page() {
     let nan = f64::NAN;
     for c in &mut broken.effects {
         (c.evidence, c.threshold, c.minimum_detectable) = (nan, f64::INFINITY, Some(nan));
-        c.parameters.iter_mut().for_each(|p| (p.value, p.ci95) = (nan, [f64::NEG_INFINITY, nan]));
+        for p in &mut c.parameters {
+            (p.value, p.ci95) = (nan, [f64::NEG_INFINITY, nan]);
+            p.by_flight.iter_mut().for_each(|f| (f.value, f.sd) = (nan, nan));
+        }
         c.by_flight.iter_mut().for_each(|f| (f.value, f.sd) = (nan, nan));
         for curve in c.curve.iter_mut() {
             curve.residual.fill(nan);

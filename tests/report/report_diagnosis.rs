@@ -137,16 +137,19 @@ fn candidate(
         value,
         ci95: [value - half, value + half],
         unit: unit.into(),
+        by_flight: Vec::new(),
     };
-    let mut parameters = vec![parameter(name, value, half, unit)];
-    if asserted {
-        parameters.push(parameter("M", 52.0, 9.0, "sharpness of the blend"));
-    }
     let by_flight = |(i, flight): (usize, &&str)| FlightEstimate {
         flight: (*flight).into(),
         value: value + half * [0.5, -0.7, 0.3][i],
         sd: 0.8 * half,
     };
+    let by_flight: Vec<FlightEstimate> = FLIGHTS.iter().enumerate().map(by_flight).collect();
+    let mut parameters = vec![parameter(name, value, half, unit)];
+    parameters[0].by_flight.clone_from(&by_flight);
+    if asserted {
+        parameters.push(parameter("M", 52.0, 9.0, "sharpness of the blend"));
+    }
     let shown = matches!(id, "lift_stall" | "lift_alpha2" | "drag_alpha2");
     Candidate {
         id: id.into(),
@@ -168,7 +171,7 @@ fn candidate(
         },
         heldout_error_reduction: if shown { 0.43 } else { f64::NAN },
         selected_in_bootstraps: if asserted { 0.94 } else { f64::NAN },
-        by_flight: FLIGHTS.iter().enumerate().map(by_flight).collect(),
+        by_flight,
         minimum_detectable: least.is_finite().then_some(least),
         refused: match id {
             "drag_alpha2" => {

@@ -127,21 +127,25 @@ fn added(a: &Amendment) -> Section {
     let columns =
         [("Coefficient", Left), ("Value", Right), ("95 % interval", Right), ("What it is", Left)];
     let mut table = Table::new("Coefficients of the effects", &columns);
-    let mut figures = Vec::new();
+    let mut single = Vec::new();
     for p in a.parameters.iter().filter(|p| p.added) {
         let bound = if p.at_bound { " (at a bound of what is possible)" } else { "" };
         let what = format!("{}{bound}", p.meaning);
         table.push([p.name.clone(), number(p.value), interval(p.ci95[0], p.ci95[1]), what]);
         if !p.by_flight.is_empty() {
-            figures.push(Figure::Whiskers(by_flight(p)));
+            let apart = suspects::disagreement(p.by_flight.iter().map(|f| [f.value, f.sd]));
+            single.push((apart, Figure::Whiskers(by_flight(p))));
         }
     }
     if table.rows.is_empty() {
         return Section::default();
     }
-    figures.insert(0, Figure::Table(table));
+    single.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut figures = vec![Figure::Table(table)];
+    figures.extend(single.into_iter().map(|(_, figure)| figure));
     let note = "As fitted by output error together with the model's own coefficients; below, what \
-                each flight alone says, to first order.";
+                each flight alone says, to first order. The coefficient on which they differ most \
+                comes first.";
     Section::new("The effects as fitted", note, figures)
 }
 

@@ -22,7 +22,11 @@ pub fn comparison_page(report: &ComparisonReport) -> Page {
     let answer = Figure::Answer(Box::new(boxed));
     // of one model the box above says where it fails
     let leading = if c.models.len() == 1 { 0 } else { LEADING };
-    let words = Figure::Findings(findings(c, leading));
+    let mut said = findings(c, leading);
+    if let [only] = &c.models[..] {
+        worst_first(&mut said.rest, only);
+    }
+    let words = Figure::Findings(said);
     // the page of a single model begins with its failures, that of several models with their differences
     let (first, later) = match c.models.len() {
         0 | 1 => (vec![answer, words], Section::default()),
@@ -111,6 +115,16 @@ fn findings(c: &Comparison, leading: usize) -> Findings {
         lead.push(Finding { sentence, link: None });
     }
     Findings { lead, rest, ..Findings::default() }
+}
+
+/// Moves the sentence on the channel that the box names to the front of `sentences`.
+fn worst_first(sentences: &mut [Finding], model: &ModelResult) {
+    let Some((channel, _)) = place::worst(model) else { return };
+    let name = channel_name(channel);
+    let own = |finding: &Finding| finding.link.as_ref().is_some_and(|link| link.option == name);
+    if let Some(k) = sentences.iter().position(own) {
+        sentences[..=k].rotate_right(1);
+    }
 }
 
 /// Link to the regimes of the channel whose worst regime `sentence` describes.

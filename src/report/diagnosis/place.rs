@@ -23,7 +23,9 @@ pub(crate) fn of_diagnosis(d: &Diagnosis) -> String {
     let name = name(&worst.channel);
     match d.verdict {
         Verdict::Adequate => {
-            format!("Where it fails: nowhere clearly; tuned, it leaves most of {name}, {left} %.")
+            format!(
+                "Where it fails: nowhere clearly; {left} % of {name} is the most left after tuning."
+            )
         }
         _ => format!("Where it fails: most in {name}, of which {left} % is left after tuning."),
     }
@@ -49,7 +51,7 @@ fn name(symbol: &str) -> &str {
 }
 
 /// A variable without its unit, which is the last word if that word contains `°` or `/` or is a single letter.
-fn plain(variable: &str) -> &str {
+pub(crate) fn plain(variable: &str) -> &str {
     match variable.rsplit_once(' ') {
         Some((words, unit)) if unit.contains(['°', '/']) || unit.len() == 1 => words,
         _ => variable,

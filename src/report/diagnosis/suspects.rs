@@ -2,12 +2,13 @@
 
 use crate::Align::{Left, Right};
 use crate::diagnosis::page::channel_of;
+use crate::diagnosis::place::plain;
 use crate::kit::numbers::{NORMAL_95, interval, number};
 use crate::{
     Choice, ChoiceOption, Evidence, EvidenceGroup, EvidenceRow, Figure, Section, Style, Table,
     Whisker, Whiskers, XyBand, XyFigure, XyMark, XySeries,
 };
-use greylag_sysid::diagnose::{Candidate, Curve, Diagnosis};
+use greylag_sysid::diagnose::{Candidate, Curve, Diagnosis, Parameter};
 
 /// Anchor of the figure, for links from sentences about an effect.
 pub(crate) const ANCHOR: &str = "effect";
@@ -109,16 +110,23 @@ pub(crate) fn curves(d: &Diagnosis) -> Section {
     if options.is_empty() {
         return Section::default();
     }
-    let note = "What the flights show that the tuned model without the effect does not (points, \
-                averages over about 0.4 s), and what the effect contributes as fitted, with its \
-                95 % interval.";
+    let found: Vec<&str> = d.effects.iter().filter(|c| c.asserted).map(|c| c.id.as_str()).collect();
+    let beside = match found.len() < options.len() && !found.is_empty() {
+        true => format!(" Missing: {}; the others are no more than suspects.", found.join(", ")),
+        false => String::new(),
+    };
+    let note = format!(
+        "What the flights show that the tuned model without the effect does not (points, \
+         averages over about 0.4 s), and what the effect contributes as fitted, with its \
+         95 % interval.{beside}"
+    );
     let choice = Choice { anchor: ANCHOR.into(), label: "Effect".into(), options };
     // curves of candidates that are not asserted must not appear to be findings
     let title = match d.effects.iter().any(|c| c.asserted) {
         true => "The effect",
         false => "The nearest suspects, none of them shown",
     };
-    Section::new(title, note, vec![Figure::Choice(choice)])
+    Section::new(title, &note, vec![Figure::Choice(choice)])
 }
 
 fn figures(c: &Candidate, curve: &Curve) -> Vec<Figure> {
@@ -130,7 +138,7 @@ fn plot(c: &Candidate, curve: &Curve) -> XyFigure {
     let some = |list: &[f64]| list.iter().copied().step_by(every).collect::<Vec<f64>>();
     let column = |k: usize| curve.contribution.iter().map(|x| x[k]).collect::<Vec<f64>>();
     XyFigure {
-        title: format!("{} over {}", channel_of(&curve.channel), curve.variable),
+        title: format!("{} over {}", channel_of(&curve.channel), plain(&curve.variable)),
         x_label: curve.variable.clone(),
         y_label: format!("Measured − tuned model ({})", curve.unit),
         bands: vec![XyBand {
@@ -159,8 +167,7 @@ fn plot(c: &Candidate, curve: &Curve) -> XyFigure {
 }
 
 fn parameters(c: &Candidate) -> Table {
-    let columns =
-        [("Parameter", Left), ("Value", Right), ("95 % interval", Right), ("What it is", Left)];
+    let columns = [("Parameter", Left), ("Value", Right), ("95 % interval", Right), ("Unit", Left)];
     let mut table = Table::new(&format!("Parameters of {}", c.id), &columns);
     for p in &c.parameters {
         let ends = interval(p.ci95[0], p.ci95[1]);
@@ -170,22 +177,41 @@ fn parameters(c: &Candidate) -> Table {
 }
 
 pub(crate) fn agreement(d: &Diagnosis) -> Section {
-    let figures: Vec<Figure> = d
-        .effects
-        .iter()
-        .filter(|c| (c.asserted || c.evidence > c.threshold) && !c.by_flight.is_empty())
-        .filter_map(|c| Some(Figure::Whiskers(by_flight(c)?)))
-        .collect();
-    let note = "The first parameter fitted on each flight alone, with its 95 % interval: flights \
-                that disagree point to something else than this effect.";
+    let shown = d.effects.iter().filter(|c| c.asserted || c.evidence > c.threshold);
+    let mut all: Vec<(f64, Whiskers)> = Vec::new();
+    for c in shown {
+        for p in c.parameters.iter().filter(|p| !p.by_flight.is_empty()) {
+            let apart = disagreement(p.by_flight.iter().map(|f| [f.value, f.sd]));
+            all.push((apart, by_flight(c, p)));
+        }
+    }
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let figures = all.into_iter().map(|(_, figure)| Figure::Whiskers(figure)).collect();
+    let note = "Each parameter fitted on each flight alone, with its 95 % interval. The one on which the flights differ \
+                most, in standard deviations, comes first: flights that disagree point to something else than this \
+                effect. “all flights” is the final value, fitted together with the model's own coefficients, and may \
+                lie beside those of the flights.";
     Section::new("Do the flights agree?", note, figures)
 }
 
-fn by_flight(c: &Candidate) -> Option<Whiskers> {
-    let first = c.parameters.first()?;
-    let flights = c.by_flight.iter().map(|f| (f.flight.as_str(), f.value, f.sd));
-    let title = format!("{}: {}", c.id, first.name);
-    Some(flight_by_flight(title, &first.unit, flights, (first.value, first.ci95)))
+fn by_flight(c: &Candidate, p: &Parameter) -> Whiskers {
+    let flights = p.by_flight.iter().map(|f| (f.flight.as_str(), f.value, f.sd));
+    let title = format!("{}: {}", c.id, p.name);
+    flight_by_flight(title, &p.unit, flights, (p.value, p.ci95))
+}
+
+/// Root mean square distance of estimates from their weighted mean, in their standard deviations. `flights` holds estimates and
+/// standard deviations. 0 if fewer than two of them are finite.
+pub(crate) fn disagreement(flights: impl Iterator<Item = [f64; 2]>) -> f64 {
+    let known: Vec<[f64; 2]> =
+        flights.filter(|[value, sd]| value.is_finite() && sd.is_finite() && *sd > 0.0).collect();
+    if known.len() < 2 {
+        return 0.0;
+    }
+    let total: f64 = known.iter().map(|[_, sd]| sd.powi(-2)).sum();
+    let mean = known.iter().map(|[value, sd]| value * sd.powi(-2)).sum::<f64>() / total;
+    let square: f64 = known.iter().map(|[value, sd]| ((value - mean) / sd).powi(2)).sum();
+    (square / (known.len() - 1) as f64).sqrt()
 }
 
 /// Estimates of a coefficient from each flight (flight, value, standard deviation), then the estimate from all flights together
@@ -217,5 +243,20 @@ pub(crate) fn flight_by_flight<'a>(
         lines: vec![0.0],
         legend,
         rows,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flights_that_differ_beyond_their_deviations_disagree() {
+        let of = |all: &[[f64; 2]]| disagreement(all.iter().copied());
+        assert_eq!(of(&[[1.0, 0.1]]), 0.0);
+        assert_eq!(of(&[[1.0, 0.1], [f64::NAN, 0.1], [2.0, 0.0]]), 0.0);
+        // a distance of 0.5 from the mean on both sides: √(2 × 25)
+        assert!((of(&[[1.0, 0.1], [2.0, 0.1]]) - 50f64.sqrt()).abs() < 1e-9);
+        assert!(of(&[[1.0, 0.5], [1.2, 0.5]]) < 1.0);
     }
 }

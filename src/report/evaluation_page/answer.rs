@@ -89,7 +89,10 @@ fn ranking(
     }
     let behind = |s: &Score| format!("{}°", number(s.mean_deg));
     if !leaving.is_empty() {
-        text += &format!("; leaving the envelope more often: {}", each(leaving, behind));
+        text += &format!(
+            "; behind it, since they leave the envelope more often: {}",
+            each(leaving, behind)
+        );
     }
     text + "."
 }
@@ -100,18 +103,15 @@ fn each(ranked: &[(&Evaluation, &Score)], of: impl Fn(&Score) -> String) -> Stri
     said.join(", ")
 }
 
-/// Sentence on the group in which the best controller has its largest error; `None` if there are fewer than two groups.
+/// Sentence on the largest error of the best controller, with its group if there are several; `None` if there is no group.
 fn weakest(best: &Evaluation) -> Option<String> {
     let groups = || best.groups.iter().filter(|s| s.targets != ALL);
     let worst = groups().max_by(|a, b| a.max_deg.total_cmp(&b.max_deg))?;
-    (groups().count() > 1).then(|| {
-        format!(
-            "{} is worst on {}: {}° on one target.",
-            label(best),
-            worst.targets.replace('_', " "),
-            number(worst.max_deg)
-        )
-    })
+    let group = match groups().count() {
+        1 => String::new(),
+        _ => format!(" on {}", worst.targets.replace('_', " ")),
+    };
+    Some(format!("{} is worst{group}: {}° on one target.", label(best), number(worst.max_deg)))
 }
 
 fn percent(share: f64) -> String {

@@ -44,7 +44,13 @@ impl Parts {
         let timed = report.timing.as_ref().filter(|_| report.envelope.is_some());
         let latency = timed.map(|timing| {
             let [p50, p999] = timing.percentiles_us([0.5, 0.999]).map(|us| us / 1e3);
-            format!("latency {} ms, {} ms at p99.9", number(p50), number(p999))
+            let budget = number(timing.budget_us / 1e3);
+            format!(
+                "latency ({}) {} ms in the median, {} ms at p99.9, of {budget} ms",
+                timing.measure,
+                number(p50),
+                number(p999)
+            )
         });
         Parts {
             first,
@@ -103,13 +109,20 @@ fn capital(text: &str) -> String {
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// Text on the largest integral of error and overshoot over the segments; `None` without segments or limits.
+/// Text on the largest integral of error, with its target, and on the largest overshoot over the segments; `None` without
+/// segments or limits.
 fn on_the_way(report: &FlightReport) -> Option<String> {
     let qualities = report.qualities().filter(|all| !all.is_empty())?;
     let integral = most(&qualities, |q| q.error_integral_deg_s);
+    let slowest =
+        report.segments.iter().zip(&qualities).find(|(_, q)| q.error_integral_deg_s == integral);
+    let at = slowest.map_or_else(String::new, |(s, _)| {
+        let [roll, pitch] = [s.roll_target_rad, s.pitch_target_rad].map(signed);
+        format!(" (to roll {roll}°, pitch {pitch}°)")
+    });
     let overshoot = most(&qualities, |q| q.overshoot_deg[0].max(q.overshoot_deg[1]));
     let (integral, overshoot) = (number(integral), number(overshoot));
-    Some(format!("integral of error up to {integral}° s, overshoot up to {overshoot}°"))
+    Some(format!("integral of error up to {integral}° s{at}, overshoot up to {overshoot}°"))
 }
 
 fn settled_by_difficulty(segments: &[Segment]) -> Option<String> {
@@ -138,7 +151,8 @@ fn details(report: &FlightReport) -> Vec<String> {
             100.0 * TRANSIENT
         ));
     }
-    if let Some(timing) = &report.timing {
+    // with an envelope, the latency stands among the measurements already
+    if let Some(timing) = report.timing.as_ref().filter(|_| report.envelope.is_none()) {
         let [p50, p99, p999] = timing.percentiles_us([0.5, 0.99, 0.999]).map(|us| us / 1e3);
         details.push(format!(
             "Loop, {}: p50 {p50:.2} ms, p99 {p99:.2} ms, p99.9 {p999:.2} ms of {} ms.",

@@ -54,6 +54,10 @@ pub enum Outcome {
     Missed,
     /// There is no requirement, or the result is undetermined.
     Open,
+    /// A check found nothing to correct.
+    Sound,
+    /// A check found something to correct.
+    Faulty,
 }
 
 /// Verdict in one sentence, with details.
@@ -77,6 +81,8 @@ impl Verdict {
             Outcome::Reached => ("reached", "Reached"),
             Outcome::Missed => ("missed", "Missed"),
             Outcome::Open => ("open", "Open"),
+            Outcome::Sound => ("reached", "Sound"),
+            Outcome::Faulty => ("missed", "To correct"),
         };
         let details: String =
             self.details.iter().map(|d| format!("<li>{}</li>", escape(d))).collect();

@@ -49,8 +49,11 @@ pub fn sentence(subject: &Subject) -> String {
                  the model more closely"
                     .into()
             }
+            Some(RegimeVariable::Flight) => {
+                "which differs from flight to flight; the samples are too few to say by how much".into()
+            }
             Some(variable) => format!(
-                "which follows {}, though no range of it has the samples to give a figure",
+                "which follows {}; the samples are too few to say by how much",
                 spoken(variable)
             ),
             None => "with no regime in which the model is surely off".into(),

@@ -170,8 +170,15 @@ export function follow(effect) {
   const named = channel.bins.find((b) => VARIABLES.includes(b.variable) && effect.curve?.variable.startsWith(b.name));
   Object.assign(pick, { channel: channel.channel, variable: named?.variable ?? pick.variable, by_hand: true });
 }
-/** The cell that says most stands chosen at first. */
+/** Where a missing effect was found, the cell it acts in stands chosen at first; else the cell that says most. */
 function start(channels) {
+  const found = way(bench.failing.ways) === "tuned" ? bench.diagnosis?.effects.find((e) => e.asserted && e.curve) : null;
+  const channel = found && channels.find((c) => c.channel === found.curve.channel);
+  const named = channel?.bins.find((b) => VARIABLES.includes(b.variable) && found.curve.variable.startsWith(b.name));
+  if (named) {
+    Object.assign(pick, { channel: channel.channel, variable: named.variable });
+    return;
+  }
   let best = -1;
   for (const c of channels)
     for (const b of c.bins.filter((b) => VARIABLES.includes(b.variable))) {
@@ -341,7 +348,10 @@ function paint(canvas, map, limit) {
   [canvas.width, canvas.height] = [width * ratio, height * ratio];
   const ctx = canvas.getContext("2d");
   ctx.scale(ratio, ratio);
-  const [left, bottom] = [26, 16];
+  const places = (edges, k) => String(+edges[k].toPrecision(2)).replace("-", "−");
+  ctx.font = `10px ${ink("sans")}`;
+  const beta = [`${places(map.beta_deg, map.beta_deg.length - 1)}°`, places(map.beta_deg, 0)];
+  const [left, bottom] = [Math.ceil(Math.max(...beta.map((text) => ctx.measureText(text).width))) + 5, 16];
   const [columns, rows] = [map.alpha_deg.length - 1, map.beta_deg.length - 1];
   const [w, h] = [(width - left) / columns, (height - bottom) / rows];
   for (const cell of map.cells) {
@@ -356,13 +366,11 @@ function paint(canvas, map, limit) {
   }
   ctx.globalAlpha = 1;
   ctx.fillStyle = ink("muted");
-  ctx.font = `10px ${ink("sans")}`;
-  const places = (edges, k) => show(edges[k]).replace(/\.0+$/, "");
   ctx.fillText(places(map.alpha_deg, 0), left, height - 3);
   ctx.textAlign = "right";
   ctx.fillText(`${places(map.alpha_deg, columns)}°`, width, height - 3);
-  ctx.fillText(`${places(map.beta_deg, rows)}°`, left - 3, 10);
-  ctx.fillText(places(map.beta_deg, 0), left - 3, rows * h);
+  ctx.fillText(beta[0], left - 3, 10);
+  ctx.fillText(beta[1], left - 3, rows * h);
 }
 export const repaint = () => parts?.map.paint?.();
 const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);

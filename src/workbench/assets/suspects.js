@@ -78,7 +78,21 @@ function suspect(bench, e, most) {
     ...e.refused.map((why) => el("p", { class: "bad" }, why)),
     e.indistinguishable_from.length ? el("p", {}, "These flights cannot tell it from ", el("b", {}, e.indistinguishable_from.join(", ")), ".") : "",
     e.indistinguishable_from.length ? el("div", { class: "row" }, e.indistinguishable_from.map((other) => apart(bench, [e.id, other]))) : "",
-    e.by_flight.length > 1 ? more("Do the flights agree?", [el("ul", {}, e.by_flight.map((f) => el("li", {}, `${f.flight}: ${show(f.value)} ± ${show(1.96 * f.sd, 2)}`)))], `agree-${e.id}`) : "");
+    more("Do the flights agree?", agreement(e), `agree-${e.id}`));
+}
+/** Every coefficient by flight: first the one on which the flights differ most, in standard deviations. */
+function agreement(e) {
+  const alone = e.parameters.filter((p) => p.by_flight?.length > 1).sort((a, b) => spread(b) - spread(a));
+  const one = (f) => el("li", {}, `${f.flight}: ${show(f.value)} ± ${show(1.96 * f.sd, 2)}`);
+  const title = (p) => el("p", {}, el("b", {}, p.name), `${p.unit ? ` ${p.unit}` : ""}, 95 %`);
+  return alone.flatMap((p) => [title(p), el("ul", {}, p.by_flight.map(one))]);
+}
+function spread(p) {
+  const known = p.by_flight.filter((f) => f.value != null && f.sd > 0);
+  if (known.length < 2) return 0;
+  const weight = known.reduce((sum, f) => sum + f.sd ** -2, 0);
+  const mean = known.reduce((sum, f) => sum + f.value * f.sd ** -2, 0) / weight;
+  return Math.sqrt(known.reduce((sum, f) => sum + ((f.value - mean) / f.sd) ** 2, 0) / (known.length - 1));
 }
 /** The coefficient that is clearest, with its 95 % interval. */
 function decisive(e) {

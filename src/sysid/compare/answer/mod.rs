@@ -185,9 +185,9 @@ mod tests {
         assert_eq!(
             answer.effect,
             "drag_beta2 (drag rises with the square of sideslip): CDbeta2 = 0.991 (95 %: 0.986 to 0.997). With it the \
-             airspeed predicted 5 s ahead is off by 0.02 m/s instead of 0.5 m/s."
+             airspeed predicted 5 s ahead is off by 0.02 m/s instead of 0.5 m/s by tuning alone."
         );
-        assert_eq!(answer.left, "Left: most in sideslip, 0.115° after 5 s.");
+        assert_eq!(answer.left, "Largest error left: sideslip, 0.115° after 5 s.");
         assert_eq!(answer.summary(), "error at 5 s 0.0873 → 0.00083 (−99.0 %)");
         let json = serde_json::to_value(&answer).unwrap();
         assert_eq!(json["numbers"]["steps"][2]["error"], 0.00083);
@@ -209,6 +209,9 @@ mod tests {
         let one = Answer::of(&subject(&scores[..1], Vec::new()));
         assert_eq!(one.error, "On 2 flights not fitted the error at 5 s is 0.02.");
         assert!(one.effect.is_empty() && one.summary() == "error at 5 s 0.02");
+        assert_eq!(one.left, "Largest error: airspeed, 0.5 m/s after 5 s.");
+        let tuned = Answer::of(&subject(&scores[..2], Vec::new())).error;
+        assert!(tuned.ends_with("by tuning (+100 %): tuning does not help."), "{tuned}");
     }
 
     #[test]

@@ -55,6 +55,10 @@ pub fn error(n: &Numbers) -> String {
         text += &(joint + &change);
         last = Some(verb);
     }
+    let in_vain = matches!(rest, [only] if only.way == Way::Tuned && verb(only) == Verb::Rises);
+    if in_vain {
+        text += ": tuning does not help";
+    }
     text + "."
 }
 
@@ -101,20 +105,28 @@ fn alike(value: f64, ci95: [f64; 2]) -> [String; 3] {
 fn in_use(n: &Numbers, used: &InUse, subject: &str) -> String {
     let (name, unit, factor) = people(used.state);
     let of = |x: f64| format!("{}{unit}", number(factor * x));
+    // a last model with effects is compared with the model before it
+    let before = match &n.steps[..] {
+        [.., tuned, last] if last.way == Way::Effects && tuned.way == Way::Tuned => {
+            " by tuning alone"
+        }
+        _ => "",
+    };
     format!(
-        "{subject} the {name} predicted {} s ahead is off by {} instead of {}.",
+        "{subject} the {name} predicted {} s ahead is off by {} instead of {}{before}.",
         number(n.horizon_s),
         of(used.after),
         of(used.before)
     )
 }
 
-/// Sentence on the largest remaining error; empty if there is no error.
+/// Sentence on the largest remaining error; empty if there is no error. The error of a single model is no remainder.
 pub fn left(n: &Numbers) -> String {
     n.left.as_ref().map_or(String::new(), |Left { state, rmse }| {
         let (name, unit, factor) = people(state);
+        let remains = if n.steps.len() > 1 { " left" } else { "" };
         format!(
-            "Left: most in {name}, {}{unit} after {} s.",
+            "Largest error{remains}: {name}, {}{unit} after {} s.",
             number(factor * rmse),
             number(n.horizon_s)
         )

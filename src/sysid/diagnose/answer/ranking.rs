@@ -93,7 +93,8 @@ fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate>
         let [value, sd, sums] =
             fitted(found, s.id, c.name).unwrap_or([s.score.values[k], 0.0, 0.0]);
         // the standard deviation of the round that selected the effect includes the scatter between blocks
-        parameter(&about, k, value, sd.max(s.score.deviations[k]).hypot(sums))
+        let fitted = parameter(&about, k, value, sd.max(s.score.deviations[k]).hypot(sums));
+        Parameter { by_flight: of_coefficient(round, &s.by_flight, k), ..fitted }
     });
     let parameters = parameters.collect();
     let curve = match options.detail {
@@ -123,7 +124,7 @@ fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate>
         indistinguishable_from: s.class.clone(),
         heldout_error_reduction: s.heldout,
         selected_in_bootstraps: s.selected,
-        by_flight: flights(round, &s.by_flight),
+        by_flight: of_first(round, &s.by_flight),
         minimum_detectable: None,
         refused: s.refused.clone(),
         curve,
@@ -150,14 +151,17 @@ fn fitted(found: &Found, id: &str, name: &str) -> Option<[f64; 3]> {
 
 fn open(found: &Found, trial: &Trial, score: &Score, about: &Description) -> Candidate {
     let round = found.round();
-    let parameters = (0..about.coefficients.len())
-        .map(|k| parameter(about, k, score.values[k], score.deviations[k]))
-        .collect();
     // below the chance level, the estimates by flight are noise
     let by_flight = match score.evidence > found.threshold {
-        true => flights(round, &checks::by_flight(round, trial, score)),
+        true => checks::by_flight(round, trial, score),
         false => Vec::new(),
     };
+    let parameters = (0..about.coefficients.len())
+        .map(|k| Parameter {
+            by_flight: of_coefficient(round, &by_flight, k),
+            ..parameter(about, k, score.values[k], score.deviations[k])
+        })
+        .collect();
     Candidate {
         id: trial.id.into(),
         description: about.description,
@@ -173,7 +177,7 @@ fn open(found: &Found, trial: &Trial, score: &Score, about: &Description) -> Can
         indistinguishable_from: Vec::new(),
         heldout_error_reduction: f64::NAN,
         selected_in_bootstraps: f64::NAN,
-        by_flight,
+        by_flight: of_first(round, &by_flight),
         minimum_detectable: None,
         refused: Vec::new(),
         curve: None,
@@ -187,6 +191,7 @@ fn parameter(about: &Description, k: usize, value: f64, sd: f64) -> Parameter {
         value,
         ci95: [value - INTERVAL * sd, value + INTERVAL * sd],
         unit: c.unit.into(),
+        by_flight: Vec::new(),
     }
 }
 
@@ -194,6 +199,17 @@ fn names(channels: &[usize]) -> Vec<String> {
     const NAMES: [&str; 6] = ["D", "L", "Y", "l", "m", "n"];
     debug_assert_eq!(ChannelId::ALL[0], ChannelId::Drag);
     channels.iter().map(|c| NAMES[*c].to_owned()).collect()
+}
+
+/// Estimates of the first free coefficient from each flight.
+fn of_first(round: &Round, all: &[(usize, Vec<[f64; 2]>)]) -> Vec<FlightEstimate> {
+    all.first().map_or_else(Vec::new, |(_, values)| flights(round, values))
+}
+
+/// Estimates of coefficient `k` from each flight; empty if it was not free.
+fn of_coefficient(round: &Round, all: &[(usize, Vec<[f64; 2]>)], k: usize) -> Vec<FlightEstimate> {
+    let own = all.iter().find(|(index, _)| *index == k);
+    own.map_or_else(Vec::new, |(_, values)| flights(round, values))
 }
 
 fn flights(round: &Round, values: &[[f64; 2]]) -> Vec<FlightEstimate> {

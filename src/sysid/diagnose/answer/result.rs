@@ -138,6 +138,9 @@ pub struct Parameter {
     pub ci95: [f64; 2],
     /// Unit of `value`, with the parameter's meaning.
     pub unit: String,
+    /// Estimate from each flight alone; empty if it was not computed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub by_flight: Vec<FlightEstimate>,
 }
 
 /// One flight's estimate of a parameter.

@@ -192,19 +192,26 @@ pub fn selected(round: &Round, open: &[usize], class: &[usize], count: usize) ->
     wins as f64 / count.max(1) as f64
 }
 
-/// Estimate of the first free coefficient from each flight alone, with its standard deviation. NaN for a flight without
-/// information.
+/// Estimates from each flight alone: for each free coefficient its index among the coefficients of the effect, then by flight its
+/// estimate with its standard deviation. NaN for a flight without information.
 ///
 /// Sensor errors are estimated again for each flight. The model's coefficients keep the estimates and standard deviations
 /// from all flights. A flight with little excitation could not re-estimate them: noise in its regressors biases coefficients
 /// toward zero (errors in variables).
-pub fn by_flight(round: &Round, trial: &Trial, score: &Score) -> Vec<[f64; 2]> {
-    (0..round.flights.len())
-        .map(|flight| one_flight(round, trial, score, flight).unwrap_or([f64::NAN; 2]))
-        .collect()
+pub fn by_flight(round: &Round, trial: &Trial, score: &Score) -> Vec<(usize, Vec<[f64; 2]>)> {
+    let free = &trial.points[score.point].free;
+    let flights: Vec<Vec<[f64; 2]>> = (0..round.flights.len())
+        .map(|flight| {
+            let found = one_flight(round, trial, score, flight);
+            found.unwrap_or_else(|| vec![[f64::NAN; 2]; free.len()])
+        })
+        .collect();
+    let of = |k: usize| -> Vec<[f64; 2]> { flights.iter().map(|all| all[k]).collect() };
+    free.iter().enumerate().map(|(k, f)| (f.0, of(k))).collect()
 }
 
-fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Option<[f64; 2]> {
+/// Estimates of the free coefficients from one flight, in their order.
+fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Option<Vec<[f64; 2]>> {
     let own: Vec<usize> =
         (0..round.cells.list.len()).filter(|k| round.cells.list[*k].flight == flight).collect();
     let cells = Cells {
@@ -227,16 +234,17 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     let p = Projected::new(&cells, &with_residual, last, &known, &noise, &shared)?;
     let free = point.free.iter().enumerate().map(|(k, f)| (f.0, k, f.2)).collect();
     let contribution = point.contribution.map(|_| point.free.len());
-    let first = point.free[0].0;
+    let indices: Vec<usize> = point.free.iter().map(|f| f.0).collect();
     let point = Point { values: point.values.clone(), contribution, free };
     let by_itself = Trial { points: vec![point], ..trial.clone() };
     let grams = p.grams();
     let found = by_itself.score(&grams, &Draw::measured(&grams))?;
     // a residual beyond noise, for example due to another missing effect, may bias the estimate: the deviation is raised
     let misfit = misfit(&p, &trial.channels, found.fall);
-    let [value, sd] = [found.values[first], misfit * found.deviations[first]];
+    let each: Vec<[f64; 2]> =
+        indices.iter().map(|i| [found.values[*i], misfit * found.deviations[*i]]).collect();
     if contribution.is_some() {
-        return Some([value, sd]);
+        return Some(each);
     }
     // sensor noise in the columns resembles excitation but contains no information: its part is subtracted
     let disturbed = alone(&round.disturbed, flight, na, &columns);
@@ -246,9 +254,12 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     let gram = grams.total.view((0, 0), (n, n)).into_owned();
     let corrected = &gram - feint.view((0, 0), (n, n));
     let (all, left) = (scaled_inverse(&gram)?, scaled_inverse(&corrected)?);
-    let share = all[(0, 0)] / left[(0, 0)];
     let amounts = &left * grams.total.view((0, n), (n, 1)).column(0);
-    (share > LEAST_SIGNAL).then(|| [amounts[0], sd / share])
+    let one = |(k, [_, sd]): (usize, &[f64; 2])| {
+        let share = all[(k, k)] / left[(k, k)];
+        if share > LEAST_SIGNAL { [amounts[k], sd / share] } else { [f64::NAN; 2] }
+    };
+    Some(each.iter().enumerate().map(one).collect())
 }
 
 /// Ratio of the residual in `channels`, after a reduction of its square by `fall`, to the noise; at least 1.

@@ -54,8 +54,8 @@ pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
     // a candidate that absorbs prior misfit does not correct the error of a formula
     refused.extend(hidden(found, score).filter(|_| !absorbs_prior_error));
     let by_flight = checks::by_flight(round, trial, score);
-    let first = trial.points[score.point].free[0].0;
-    if checks::contradict(score.values[first], &by_flight) {
+    let (first, of_first) = &by_flight[0];
+    if checks::contradict(score.values[*first], of_first) {
         refused.push("the flights contradict one another about its amount".into());
     }
     let contribution = round.contribution(score);

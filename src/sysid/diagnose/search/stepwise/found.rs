@@ -27,8 +27,8 @@ pub struct Selected {
     pub heldout: f64,
     /// Share of bootstraps in which the effect, or one of `class`, ranks first.
     pub selected: f64,
-    /// Estimate of the first free coefficient from each flight, with its standard deviation.
-    pub by_flight: Vec<[f64; 2]>,
+    /// For each free coefficient its index, and its estimate from each flight with its standard deviation.
+    pub by_flight: Vec<(usize, Vec<[f64; 2]>)>,
     /// Channels it acts in, the largest reduction first.
     pub channels: Vec<usize>,
     /// Reduction of the squared whitened error, by channel.
