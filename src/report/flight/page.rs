@@ -20,7 +20,7 @@ pub(crate) fn page(report: &FlightReport) -> Page {
     sections.push(attitude(report));
     sections.extend(quality::section(report));
     sections.extend([air_data(report), surfaces(report)]);
-    sections.extend(report.timing.as_ref().map(|t| loop_timing(report, t)));
+    sections.extend(report.timed().map(|t| loop_timing(report, t)));
     if !report.segments.is_empty() {
         sections.push(targets::section(report));
     }
@@ -260,7 +260,7 @@ fn events(report: &FlightReport) -> Section {
     for (i, e) in report.events.iter().enumerate() {
         table.push([
             (i + 1).to_string(),
-            format!("{:.2}", e.time_s),
+            if e.time_s.is_finite() { format!("{:.2}", e.time_s) } else { "–".into() },
             e.kind.name().into(),
             e.text.clone(),
         ]);

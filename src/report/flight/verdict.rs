@@ -33,7 +33,7 @@ impl Parts {
             _ => format!("Tracked {tracked} of {all} targets"),
         }];
         first.extend(settled_by_difficulty(&report.segments));
-        first.push(match report.timing.as_ref().map(LoopTiming::late) {
+        first.push(match report.timed().map(LoopTiming::late) {
             None => "loop timing was not recorded".into(),
             Some(0) => "no late cycle".into(),
             Some(1) => "1 late cycle".into(),
@@ -41,7 +41,7 @@ impl Parts {
         });
         let envelope =
             report.envelope.map(|e| clause(&kept(&report.flight.samples, &e), &e.limits));
-        let timed = report.timing.as_ref().filter(|_| report.envelope.is_some());
+        let timed = report.timed().filter(|_| report.envelope.is_some());
         let latency = timed.map(|timing| {
             let [p50, p999] = timing.percentiles_us([0.5, 0.999]).map(|us| us / 1e3);
             let budget = number(timing.budget_us / 1e3);
@@ -67,7 +67,7 @@ pub(crate) fn sentence(report: &FlightReport) -> String {
 
 pub(crate) fn verdict(report: &FlightReport) -> Verdict {
     let (tracked, all) = (report.tracked(), report.segments.len());
-    let late = report.timing.as_ref().map(LoopTiming::late);
+    let late = report.timed().map(LoopTiming::late);
     let kept = report.envelope.map(|e| kept(&report.flight.samples, &e).kept);
     let reason = reason(all - tracked, late, kept);
     let outcome = match (all, late) {
@@ -152,7 +152,7 @@ fn details(report: &FlightReport) -> Vec<String> {
         ));
     }
     // with an envelope, the latency stands among the measurements already
-    if let Some(timing) = report.timing.as_ref().filter(|_| report.envelope.is_none()) {
+    if let Some(timing) = report.timed().filter(|_| report.envelope.is_none()) {
         let [p50, p99, p999] = timing.percentiles_us([0.5, 0.99, 0.999]).map(|us| us / 1e3);
         details.push(format!(
             "Loop, {}: p50 {p50:.2} ms, p99 {p99:.2} ms, p99.9 {p999:.2} ms of {} ms.",
