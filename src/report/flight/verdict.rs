@@ -68,13 +68,15 @@ pub(crate) fn sentence(report: &FlightReport) -> String {
 pub(crate) fn verdict(report: &FlightReport) -> Verdict {
     let (tracked, all) = (report.tracked(), report.segments.len());
     let late = report.timed().map(LoopTiming::late);
-    let kept = report.envelope.map(|e| kept(&report.flight.samples, &e).kept);
+    let judged = report.envelope.map(|e| kept(&report.flight.samples, &e)).filter(|k| k.judged);
+    let kept = judged.map(|k| k.kept);
     let reason = reason(all - tracked, late, kept);
     let outcome = match (all, late) {
         _ if tracked < all => Outcome::Missed,
         _ if kept == Some(false) => Outcome::Missed,
         (_, Some(1..)) => Outcome::Missed,
         (0, _) | (_, None) => Outcome::Open,
+        _ if report.envelope.is_some() && kept.is_none() => Outcome::Open,
         _ => Outcome::Reached,
     };
     let Parts { first, beside } = Parts::of(report);
