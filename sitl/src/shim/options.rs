@@ -243,7 +243,7 @@ impl ShimOptions {
         )?;
         let bias = &self.bias;
         let mut biases = vec![bias.alpha_rad, bias.beta_rad, bias.airspeed_scale];
-        biases.extend(bias.gyro_radps.iter().chain(&bias.accelerometer_mps2));
+        biases.extend([bias.gyro_radps, bias.accelerometer_mps2, bias.attitude_rad].concat());
         demand(biases.iter().all(|x| x.is_finite()), "a bias must be a finite number")?;
         demand(bias.airspeed_scale > 0.0, "the airspeed scale must be positive")?;
         demand(

@@ -146,6 +146,7 @@ fn options_that_mean_nothing_are_refused_before_anything_is_opened() {
     refused(|o| o.faults.late_probability = 1.5);
     refused(|o| o.bias.airspeed_scale = 0.0);
     refused(|o| o.bias.alpha_rad = f64::INFINITY);
+    refused(|o| o.bias.attitude_rad[1] = f64::NAN);
     refused(|o| o.duration_s = Some(0.0));
     refused(|o| o.start.airspeed_mps = 0.0);
     refused(|o| o.start.altitude_m = f64::NAN);
