@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use crate::plant::{DT_S, Inputs, Truth};
 
 /// Longest delay of the surfaces, in steps: one minute. A ground station may set any delay.
-const LONGEST: f64 = 6000.0;
+const LONGEST: usize = 6000;
 
 /// States of the gyro filter and of the command delay.
 #[derive(Clone, Debug, Default)]
@@ -30,7 +30,7 @@ impl Lag {
     /// The inputs of `delay_ms`, ms, ago; the delay is rounded to whole steps. Before that, the first inputs.
     pub(super) fn delayed(&mut self, inputs: Inputs, delay_ms: f64) -> Inputs {
         // NaN, for a stack without this parameter, becomes 0
-        let steps = (delay_ms * 1e-3 / DT_S).round().max(0.0).min(LONGEST) as usize;
+        let steps = ((delay_ms * 1e-3 / DT_S).round().max(0.0) as usize).min(LONGEST);
         self.late.push_back(inputs);
         while self.late.len() > steps + 1 {
             self.late.pop_front();
