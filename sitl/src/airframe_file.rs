@@ -61,7 +61,9 @@ impl Effector {
         };
         let moves = |[least, most]: [f64; 2]| least.is_finite() && most.is_finite() && least < most;
         if travel.is_some_and(|travel| !moves(travel)) {
-            return Err(format!("surfaces.{name} has a travel that is not positive; give it in rad"));
+            return Err(format!(
+                "surfaces.{name} has a travel that is not positive; give it in rad"
+            ));
         }
         let gains = [self.aileron, self.elevator, self.rudder, self.throttle];
         if !gains.iter().all(|gain| gain.is_finite()) {

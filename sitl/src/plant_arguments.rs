@@ -71,7 +71,9 @@ struct AirArgs {
 pub fn property(text: &str) -> Result<(String, String), String> {
     let (key, name) = text.split_once('=').ok_or("write it as KEY=NAME")?;
     match Properties::default().name_mut(key) {
-        Some(_) if name.trim().is_empty() => Err(format!("{key} has no name; write it as KEY=NAME")),
+        Some(_) if name.trim().is_empty() => {
+            Err(format!("{key} has no name; write it as KEY=NAME"))
+        }
         Some(_) => Ok((key.to_owned(), name.to_owned())),
         None => Err(format!("{key} is no key; the keys are {}", Properties::KEYS.join(", "))),
     }

@@ -207,8 +207,9 @@ mod tests {
         controller.receive(&request);
         out.clear();
         controller.show(&mut out);
-        let mut answer = None;
-        Parser::default().datagram(&out, &mut |frame| answer = answer.or(frame.decode::<TimeSync>()));
+        let mut answer: Option<TimeSync> = None;
+        Parser::default()
+            .datagram(&out, &mut |frame| answer = answer.or(frame.decode::<TimeSync>()));
         assert_eq!(answer.map(|m| (m.tc1, m.ts1)), Some((i64::MAX, 7)));
     }
 }

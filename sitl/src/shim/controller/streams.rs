@@ -181,7 +181,8 @@ mod tests {
         let mut streams = Streams::new(Equipment { travel: Travel::X8, receiver: 0 });
         let (mut encoder, mut out) = (Encoder::new(1, 1), Vec::new());
         let mut send = |streams: &mut Streams, time_us: u64| {
-            let truth = Truth { static_pressure_pa: 1e5, air_density_kgpm3: 1.2, ..Truth::default() };
+            let truth =
+                Truth { static_pressure_pa: 1e5, air_density_kgpm3: 1.2, ..Truth::default() };
             let frame = StateFrame::new(time_us, &truth, Travel::X8);
             out.clear();
             streams.send(&frame, &truth, 0.0, &mut encoder, &mut out);

@@ -153,8 +153,7 @@ impl Client {
             && command.param[0] == HilStateQuaternion::ID as f32;
         if known {
             let longest = f64::from(i32::MAX);
-            self.state_interval_us =
-                (interval_us > 0.0).then_some(interval_us.min(longest) as u64);
+            self.state_interval_us = (interval_us > 0.0).then_some(interval_us.min(longest) as u64);
         }
         CommandAck {
             command: command.command,
