@@ -3,8 +3,8 @@
 use greylag::model::block::Block;
 use greylag::num::{Lanes, ROW};
 
-/// The rows of a table with `K` columns from row `first`, one per lane. Lanes beyond the end of the table repeat the last row. The
-/// table has at least one row.
+/// The rows of a table with `K` columns from row `first`, one per lane. Lanes beyond the end of the table repeat the
+/// last row. The table has at least one row.
 pub fn gather<const K: usize>(table: &[f32], first: usize) -> [Block; K] {
     let last = table.len() / K - 1;
     let mut block = [Lanes([0.0; ROW]); K];

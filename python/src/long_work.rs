@@ -1,4 +1,5 @@
-//! Runs long computations in a thread: the interpreter's lock is released, progress is reported, and Ctrl-C cancels them.
+//! Runs long computations in a thread: the interpreter's lock is released, progress is reported, and Ctrl-C cancels
+//! them.
 
 use std::ops::ControlFlow;
 use std::sync::Mutex;
@@ -13,11 +14,12 @@ use pyo3::prelude::*;
 /// Interval between two checks for signals and progress.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Runs `work` in a separate thread and returns its result. `on_stage` is called with the name of a stage and the completed
-/// fraction, 0 to 1; stages that follow each other within [`LOOK`] may be skipped.
+/// Runs `work` in a separate thread and returns its result. `on_stage` is called with the name of a stage and the
+/// completed fraction, 0 to 1; stages that follow each other within `LOOK` may be skipped.
 ///
 /// # Errors
-/// The error of `work`. An exception that `on_stage` raises, or Ctrl-C, cancels the work at its next stage and is returned.
+/// The error of `work`. An exception that `on_stage` raises, or Ctrl-C, cancels the work at its next stage and is
+/// returned.
 pub fn done<T: Send>(
     py: Python<'_>,
     on_stage: Option<Py<PyAny>>,

@@ -130,8 +130,8 @@ fn dense(layers: &Layers<'_>) -> PyResult<Dense> {
     Dense::new(&sizes, parameters).map_err(raised)
 }
 
-/// Writes the files of a policy. The networks of an older policy are removed first, and the actor is written last. A folder with
-/// an actor is therefore complete. Each file is renamed into place after it has been written.
+/// Writes the files of a policy. The networks of an older policy are removed first, and the actor is written last. A
+/// folder with an actor is therefore complete. Each file is renamed into place after it has been written.
 fn write(folder: &Path, files: &[(&str, Vec<u8>)]) -> PyResult<()> {
     let said = |what: &Path, e: std::io::Error| {
         PyOSError::new_err(format!("cannot write the policy {}: {e}", what.display()))

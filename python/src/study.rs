@@ -266,8 +266,8 @@ fn hash(path: &PathBuf) -> Result<document::Hashed, String> {
     Ok(document::Hashed::new(path, &content))
 }
 
-/// Writes the files of an amended model to the folder `out` and returns the document. All files are written and checked before
-/// the first is renamed into place.
+/// Writes the files of an amended model to the folder `out` and returns the document. All files are written and checked
+/// before the first is renamed into place.
 fn write(
     model: &GreyBox,
     original: &Path,

@@ -23,8 +23,8 @@ use crate::error::raised;
 use crate::model::Model;
 
 type Inner = Box<dyn sim::world::World + Send>;
-/// Result of a step: observations after the restart of ended episodes, rewards, ends (0 not ended, 1 time limit, 2 lost), and
-/// observations before the restart.
+/// Result of a step: observations after the restart of ended episodes, rewards, ends (0 not ended, 1 time limit, 2
+/// lost), and observations before the restart.
 type Steps<'py> = (
     Bound<'py, PyArray2<f32>>,
     Bound<'py, PyArray1<f32>>,
@@ -143,8 +143,8 @@ impl World {
     }
 }
 
-/// Makes one step of every block. A lost aircraft gets the reward that the training gives for a loss. Its last observation is
-/// that before the step, because its state may be NaN.
+/// Makes one step of every block. A lost aircraft gets the reward that the training gives for a loss. Its last
+/// observation is that before the step, because its state may be NaN.
 fn advance(
     world: &mut dyn sim::world::World,
     instances: usize,
@@ -177,7 +177,8 @@ fn advance(
     Ok(rows)
 }
 
-/// The targets of `greylag train policy` (`envelope`), or targets at the airspeed of the start, as in the paper (`start`).
+/// The targets of `greylag train policy` (`envelope`), or targets at the airspeed of the start, as in the paper
+/// (`start`).
 fn targets(model: &GreyBox, seed: u64, corners: f64, airspeeds: &str) -> PyResult<Stratified> {
     if !(0.0..=1.0).contains(&corners) {
         return Err(PyValueError::new_err(format!(
@@ -194,8 +195,8 @@ fn targets(model: &GreyBox, seed: u64, corners: f64, airspeeds: &str) -> PyResul
     }
 }
 
-/// Smallest and largest value of each observation. They are at the bounds of the state, because [`observe`] is monotonic in each
-/// of its arguments.
+/// Smallest and largest value of each observation. They are at the bounds of the state, because [`observe`] is
+/// monotonic in each of its arguments.
 fn observable(model: &GreyBox) -> [[f64; OBSERVATIONS]; 2] {
     let [least, most] = bounds();
     let figures = &model.airframe.actuators;

@@ -35,8 +35,8 @@ pub(crate) fn values_of(rows: &[Option<usize>], values: &[f64]) -> Vec<f64> {
     rows.iter().map(|row| row.and_then(|i| values.get(i)).copied().unwrap_or(f64::NAN)).collect()
 }
 
-/// Consecutive groups of at most `size` rows, as ranges of positions in `rows`. The first gap of every `size` rows is a group of
-/// its own, so that it stays a gap in the thinned rows.
+/// Consecutive groups of at most `size` rows, as ranges of positions in `rows`. The first gap of every `size` rows is a
+/// group of its own, so that it stays a gap in the thinned rows.
 pub(crate) fn groups(rows: &[Option<usize>], size: usize) -> Vec<Range<usize>> {
     let mut groups = Vec::new();
     for (k, chunk) in rows.chunks(size).enumerate() {
@@ -53,8 +53,8 @@ pub(crate) fn groups(rows: &[Option<usize>], size: usize) -> Vec<Range<usize>> {
     groups
 }
 
-/// Two values for every group: the smallest and the largest, in their original order; NaN without finite values. A group of a
-/// single row gives one value.
+/// Two values for every group: the smallest and the largest, in their original order; NaN without finite values. A
+/// group of a single row gives one value.
 pub(crate) fn extremes(values: &[f64], groups: &[Range<usize>]) -> Vec<f64> {
     let mut thin = Vec::with_capacity(2 * groups.len());
     for group in groups {

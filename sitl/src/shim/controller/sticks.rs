@@ -33,8 +33,8 @@ impl Sticks {
         self.since.map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
     }
 
-    /// Stores an override. The value 0 in one of the first three channels releases all three to the radio. The value 65535 leaves
-    /// a channel unchanged.
+    /// Stores an override. The value 0 in one of the first three channels releases all three to the radio. The value
+    /// 65535 leaves a channel unchanged.
     pub(super) fn override_channels(&mut self, now_us: u64, m: &RcChannelsOverride) {
         let [one, two, three, ..] = m.channel;
         let sent = [one, two, three];
