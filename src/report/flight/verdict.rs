@@ -153,7 +153,7 @@ fn details(report: &FlightReport) -> Vec<String> {
             100.0 * TRANSIENT
         ));
     }
-    // with an envelope, the latency stands among the measurements already
+    // with an envelope, the measurements already contain the latency
     if let Some(timing) = report.timed().filter(|_| report.envelope.is_none()) {
         let [p50, p99, p999] = timing.percentiles_us([0.5, 0.99, 0.999]).map(|us| us / 1e3);
         details.push(format!(
