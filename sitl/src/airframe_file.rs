@@ -82,7 +82,12 @@ pub fn apply(path: &Path, plant: &mut PlantOptions) -> Result<(), AirframeError>
     let fail = |why: String| AirframeError { path: path.to_owned(), why };
     let text = text_file::read(path).map_err(fail)?;
     let file: File = toml::from_str(&text).map_err(|e| fail(e.message().to_owned()))?;
-    plant.held.extend(file.conditions);
+    for (name, value) in file.conditions {
+        // a value that is already held comes from the command line, which takes precedence
+        if !plant.held.iter().any(|(held, _)| *held == name) {
+            plant.held.push((name, value));
+        }
+    }
     let all = || file.surfaces.values().chain(file.motors.values());
     if all().all(|e| e.position.is_none()) {
         return Ok(());
@@ -114,6 +119,17 @@ mod tests {
         std::fs::write(&path, elevon("left", "") + &elevon("right", "-")).unwrap();
         let applied = apply(&path, &mut PlantOptions::default());
         applied.map_or_else(|e| e.to_string(), |()| String::new())
+    }
+
+    #[test]
+    fn the_command_line_takes_precedence_over_a_condition() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("airframe.toml");
+        std::fs::write(&path, "[conditions]\n\"fcs/flap\" = 1.0\n\"fcs/gear\" = 0.0\n").unwrap();
+        let held = vec![("fcs/flap".to_owned(), 0.5)];
+        let mut plant = PlantOptions { held, ..PlantOptions::default() };
+        apply(&path, &mut plant).unwrap();
+        assert_eq!(plant.held, [("fcs/flap".to_owned(), 0.5), ("fcs/gear".to_owned(), 0.0)]);
     }
 
     #[test]

@@ -126,7 +126,7 @@ mod tests {
         let time: Vec<f64> = (0..100).map(at).collect();
         let rows = rows_in_order(&time, 0.1);
         let tens = groups(&rows, 10);
-        let thin = extremes(&values_of(&rows, &vec![1.0; 100]), &tens);
+        let thin = extremes(&values_of(&rows, &[1.0; 100]), &tens);
         let thin_time = pair_times(&times_of(&rows, &time), &tens);
         assert_eq!(thin_time.len(), thin.len());
         assert!(thin_time.windows(2).all(|w| w[0] < w[1]));
