@@ -1,9 +1,10 @@
-//! Rows of numbers as blocks of lanes, and back.
+//! Converts tables of numbers to SIMD blocks and back: one row per lane.
 
 use greylag::model::block::Block;
 use greylag::num::{Lanes, ROW};
 
-/// The rows from `first` on, one a lane, of a table with `K` columns. Lanes beyond its end repeat the last row.
+/// The rows of a table with `K` columns from row `first`, one per lane. Lanes beyond the end of the table repeat the
+/// last row. The table has at least one row.
 pub fn gather<const K: usize>(table: &[f32], first: usize) -> [Block; K] {
     let last = table.len() / K - 1;
     let mut block = [Lanes([0.0; ROW]); K];
@@ -16,7 +17,7 @@ pub fn gather<const K: usize>(table: &[f32], first: usize) -> [Block; K] {
     block
 }
 
-/// Writes the lanes of a block to the rows from `first` on, as many as there are.
+/// Writes the lanes of a block to the rows of `table` from row `first`. Lanes beyond the end of the table are dropped.
 pub fn scatter<const K: usize>(block: &[Block; K], table: &mut [f32], first: usize) {
     let rows = table[first * K..].chunks_exact_mut(K).take(ROW);
     for (lane, row) in rows.enumerate() {

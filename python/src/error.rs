@@ -1,4 +1,4 @@
-//! The library's errors as a Python exception.
+//! The Python exception for errors of the library.
 
 use pyo3::PyErr;
 use pyo3::exceptions::PyException;
@@ -10,7 +10,7 @@ pyo3::create_exception!(
     "What greylag cannot do: what was being done, to what, and what to do next."
 );
 
-/// A library's error as a Python exception with its message.
+/// The Python exception with the message of `error`.
 pub fn raised(error: impl std::fmt::Display) -> PyErr {
     GreylagError::new_err(error.to_string())
 }

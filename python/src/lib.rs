@@ -1,4 +1,4 @@
-//! The native part of the Python package `greylag`: numpy arrays and JSON in, the library's own functions behind.
+//! The native part of the Python package `greylag`: functions of the library for numpy arrays and JSON.
 
 mod batch;
 mod error;
@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 
 use error::GreylagError;
 
-/// Path of a file named by a user or shipped with the program, as for the commands.
+/// Path of a file that the user names or that is installed with the program, found as the commands find it.
 #[pyfunction]
 fn shipped(path: PathBuf) -> PathBuf {
     greylag::commands::shipped::shipped(&path)

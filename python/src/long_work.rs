@@ -1,5 +1,5 @@
-//! Long work beside the interpreter: the lock is released, progress is reported, Ctrl-C ends the
-//! work.
+//! Runs long computations in a thread: the interpreter's lock is released, progress is reported, and Ctrl-C cancels
+//! them.
 
 use std::ops::ControlFlow;
 use std::sync::Mutex;
@@ -11,11 +11,15 @@ use greylag::sysid::progress::{Progress, Stage};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
-/// Time between two looks at signals.
+/// Interval between two checks for signals and progress.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Does `work` on a thread of its own. `on_stage` is called with each stage and its share of the
-/// whole; an exception that it raises, or Ctrl-C, ends the work at its next stage and is returned.
+/// Runs `work` in a separate thread and returns its result. `on_stage` is called with the name of a stage and the
+/// completed fraction, 0 to 1; stages that follow each other within `LOOK` may be skipped.
+///
+/// # Errors
+/// The error of `work`. An exception that `on_stage` raises, or Ctrl-C, cancels the work at its next stage and is
+/// returned.
 pub fn done<T: Send>(
     py: Python<'_>,
     on_stage: Option<Py<PyAny>>,

@@ -1,4 +1,4 @@
-//! A model as Python sees it: rates, steps and flights of many aircraft at once.
+//! The Python class of a model: state derivatives, steps and simulated flights of many aircraft at once.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use crate::batch::{gather, scatter};
 use crate::error::raised;
 
-/// Columns of a table of states and of one of controls.
+/// Numbers of columns in a table of states and in a table of controls.
 const STATES: usize = 8;
 const CONTROLS: usize = 4;
 
@@ -30,7 +30,7 @@ fn controls<R: Copy>([aileron, elevator, throttle, rudder]: [R; CONTROLS]) -> Co
     Controls { aileron, elevator, throttle, rudder, lagged: None }
 }
 
-/// Refuses tables of another shape than `rows` rows of `columns`.
+/// An error if the table `what` does not have the shape `expected`.
 fn check(what: &str, shape: &[usize], expected: &[usize]) -> PyResult<()> {
     if shape == expected {
         return Ok(());
@@ -38,7 +38,7 @@ fn check(what: &str, shape: &[usize], expected: &[usize]) -> PyResult<()> {
     Err(PyValueError::new_err(format!("{what} has the shape {shape:?}, not {expected:?}")))
 }
 
-/// The controls in force when the actuators have rested at `measured`.
+/// The controls that act when the actuators have been at rest at the positions `measured`.
 fn acting<R: Real>(model: &GreyBox, measured: Controls<R>) -> Controls<R> {
     match model.acts_at_once() {
         true => measured,
@@ -105,7 +105,7 @@ impl Model {
         self.model.coefficients().iter().map(|c| (c.name.clone(), c.value)).collect()
     }
 
-    /// The rates of (n, 8) states under (n, 4) controls at `altitude` (m), in double precision.
+    /// Time derivatives of (n, 8) states at (n, 4) controls and the altitude `altitude` (m), in double precision.
     fn derivative<'py>(
         &self,
         py: Python<'py>,
@@ -121,7 +121,7 @@ impl Model {
         rates.into_pyarray(py).reshape([rows, STATES])
     }
 
-    /// (n, 8) states 0.01 s later, (n, 4) controls held, in single precision.
+    /// The (n, 8) states after 0.01 s with constant (n, 4) controls, in single precision.
     fn step<'py>(
         &self,
         py: Python<'py>,
@@ -137,7 +137,7 @@ impl Model {
         next.into_pyarray(py).reshape([rows, STATES])
     }
 
-    /// The flights from (n, 8) states under (steps, n, 4) controls: (steps + 1, n, 8) states.
+    /// Simulated flights from (n, 8) states with (steps, n, 4) controls: (steps + 1, n, 8) states.
     fn rollout<'py>(
         &self,
         py: Python<'py>,

@@ -1,4 +1,4 @@
-//! Policies trained elsewhere as folders that greylag flies, and folders as functions.
+//! Writes policies that were trained elsewhere to folders that greylag can fly, and evaluates the policy of a folder.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use crate::batch::{gather, scatter};
 use crate::error::raised;
 use crate::model::Model;
 
-/// The layers of a network: weights (out, in) as PyTorch has them, and biases.
+/// The layers of a network: weights with the shape (outputs, inputs), as in PyTorch, and biases.
 type Layers<'py> = Vec<(PyReadonlyArray2<'py, f32>, PyReadonlyArray1<'py, f32>)>;
 
 /// A policy read from its folder.
@@ -74,7 +74,7 @@ impl Policy {
     }
 }
 
-/// Writes a policy's folder, and replaces a policy that exists.
+/// Writes the folder of a policy and replaces an existing policy.
 #[pyfunction]
 #[pyo3(signature = (folder, model, actor, critics, trained_in, seed, steps))]
 pub fn export_policy(
@@ -109,7 +109,7 @@ fn critic(layers: &Layers<'_>) -> PyResult<Critic> {
     Critic::new(dense(layers)?).map_err(raised)
 }
 
-/// A network of PyTorch's layers.
+/// The network with these layers.
 fn dense(layers: &Layers<'_>) -> PyResult<Dense> {
     let mut sizes: Vec<usize> = layers.first().map(|(w, _)| w.shape()[1]).into_iter().collect();
     let mut parameters = Vec::new();
@@ -130,7 +130,8 @@ fn dense(layers: &Layers<'_>) -> PyResult<Dense> {
     Dense::new(&sizes, parameters).map_err(raised)
 }
 
-/// Writes each file whole, the actor last: where it is, the others are. None of an older policy is left.
+/// Writes the files of a policy. The networks of an older policy are removed first, and the actor is written last. A
+/// folder with an actor is therefore complete. Each file is renamed into place after it has been written.
 fn write(folder: &Path, files: &[(&str, Vec<u8>)]) -> PyResult<()> {
     let said = |what: &Path, e: std::io::Error| {
         PyOSError::new_err(format!("cannot write the policy {}: {e}", what.display()))

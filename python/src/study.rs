@@ -1,4 +1,4 @@
-//! From logs to what is wrong with a model: the functions of `compare`, `diagnose` and `amend`.
+//! The commands `compare`, `diagnose` and `amend` as functions.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -21,10 +21,10 @@ use crate::error::raised;
 use crate::long_work::done;
 use crate::model::Model;
 
-/// Share of a work that is reading and reconstructing.
+/// Fraction of the progress for reading the logs and reconstructing the flights.
 const INTAKE: f64 = 0.2;
 
-/// How logs are read.
+/// Options for reading logs.
 #[derive(FromPyObject)]
 pub struct Reading {
     mapping: Option<PathBuf>,
@@ -35,7 +35,7 @@ pub struct Reading {
 /// Options of `amend`.
 #[derive(FromPyObject)]
 pub struct Wanted {
-    /// Effects to add with the values of coefficients near which to search; `None` for what a diagnosis asserts.
+    /// Effects to add, each with start values of its coefficients. `None` adds the effects that a diagnosis asserts.
     effects: Option<Vec<(String, HashMap<String, f64>)>>,
     conventions: bool,
     from_scratch: bool,
@@ -50,7 +50,7 @@ impl Reading {
         Ok(logs::Options { tolerance, mapping, ..logs::Options::default() })
     }
 
-    /// A log, refused where wrong units, signs or axes were found.
+    /// The log at `path`. An error if wrong units, signs or axes were found and the options do not accept them.
     fn log(&self, path: &Path) -> Result<Log, String> {
         let log = logs::load(path, &self.options()?).map_err(said)?;
         match log.problems().filter(|_| !self.despite_problems) {
@@ -63,7 +63,7 @@ impl Reading {
         }
     }
 
-    /// The flights of `paths`, reconstructed; findings about them are appended to `notes`.
+    /// The reconstructed flights of `paths`; the findings of the log readers are appended to `notes`.
     fn flights(
         &self,
         paths: &[PathBuf],
@@ -94,7 +94,7 @@ fn said(error: impl std::fmt::Display) -> String {
     error.to_string()
 }
 
-/// The stages of the work after the intake as stages of the whole.
+/// Reports the stages after the logs have been read, with fractions of the whole work.
 fn after_intake<'a>(
     progress: &'a Progress<'a>,
 ) -> impl Fn(Stage<'_>) -> std::ops::ControlFlow<()> + Sync + 'a {
@@ -172,7 +172,7 @@ pub fn diagnose(
     })
 }
 
-/// The JSON document of `greylag amend`; model, airframe and document are written to `out`.
+/// The JSON document of `greylag amend`. Writes the model, the airframe and the document to the folder `out`.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "the Python layer names them")]
 pub fn amend(
@@ -224,7 +224,7 @@ pub fn amend(
     })
 }
 
-/// The effects to add.
+/// The effects to add: those of `wanted`, otherwise those that a diagnosis of `flights` asserts.
 fn effects(
     wanted: &Wanted,
     model: &GreyBox,
@@ -266,7 +266,8 @@ fn hash(path: &PathBuf) -> Result<document::Hashed, String> {
     Ok(document::Hashed::new(path, &content))
 }
 
-/// Writes the folder of an amended model, whole or not at all; gives the document.
+/// Writes the files of an amended model to the folder `out` and returns the document. All files are written and checked
+/// before the first is renamed into place.
 fn write(
     model: &GreyBox,
     original: &Path,

@@ -1,4 +1,4 @@
-//! What a policy is trained in, as the Rust training uses it: JSBSim, or a model imagined in lanes.
+//! The training environments of the Rust policy training: JSBSim, or a model that simulates many aircraft at once.
 
 use std::sync::{Arc, Mutex, MutexGuard};
 
@@ -23,8 +23,8 @@ use crate::error::raised;
 use crate::model::Model;
 
 type Inner = Box<dyn sim::world::World + Send>;
-/// Observations of the episodes as they go on, rewards, how each ended, observations before those that ended
-/// began anew.
+/// Result of a step: observations after the restart of ended episodes, rewards, ends (0 not ended, 1 time limit, 2
+/// lost), and observations before the restart.
 type Steps<'py> = (
     Bound<'py, PyArray2<f32>>,
     Bound<'py, PyArray1<f32>>,
@@ -32,7 +32,7 @@ type Steps<'py> = (
     Bound<'py, PyArray2<f32>>,
 );
 
-/// Aircraft in episodes of their own, which begin anew when they end.
+/// Aircraft with one episode each; an episode that ends is restarted with the next target.
 #[pyclass(frozen, module = "greylag._greylag")]
 pub struct World {
     inner: Mutex<Inner>,
@@ -40,7 +40,7 @@ pub struct World {
     bounds: [[f64; OBSERVATIONS]; 2],
 }
 
-/// Results of a step, in rows.
+/// Result of a step, one row per aircraft, in the order of [`Steps`].
 struct Rows {
     now: Vec<f32>,
     reward: Vec<f32>,
@@ -50,7 +50,7 @@ struct Rows {
 
 #[pymethods]
 impl World {
-    /// `instances` aircraft that are simulated with `model`.
+    /// `instances` aircraft that `model` simulates.
     #[staticmethod]
     fn imagined(
         model: &Model,
@@ -67,7 +67,7 @@ impl World {
         Ok(World::new(Box::new(world), instances, &model.model))
     }
 
-    /// The X8 in JSBSim; `model` gives its airframe.
+    /// One X8 that JSBSim simulates; `model` provides its airframe.
     #[staticmethod]
     fn x8(model: &Model, seed: u64, corners: f64, airspeeds: &str) -> PyResult<World> {
         let targets = targets(&model.model, seed, corners, airspeeds)?;
@@ -75,27 +75,27 @@ impl World {
         Ok(World::new(Box::new(world), 1, &model.model))
     }
 
-    /// Least and greatest observation of an episode that has not ended.
+    /// Smallest and largest value of each observation while an episode has not ended.
     #[getter]
     fn bounds(&self) -> [[f64; OBSERVATIONS]; 2] {
         self.bounds
     }
 
-    /// Targets given, and episodes that ended outside the envelope.
+    /// Number of targets so far, and number of episodes that ended outside the envelope.
     #[getter]
     fn episodes(&self) -> PyResult<(u64, u64)> {
         let world = self.lock()?;
         Ok((world.targets(), world.lost()))
     }
 
-    /// Begins all episodes anew with the next targets.
+    /// Restarts all episodes with the next targets.
     fn restart(&self) -> PyResult<()> {
         let mut world = self.lock()?;
         let given = world.targets();
         world.restart(given).map_err(raised)
     }
 
-    /// What the aircraft observe now, (n, 16).
+    /// The present observations, (n, 16).
     fn observe<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let world = self.lock()?;
         let mut seen = vec![0.0; self.instances * OBSERVATIONS];
@@ -105,7 +105,7 @@ impl World {
         seen.into_pyarray(py).reshape([self.instances, OBSERVATIONS])
     }
 
-    /// One step of all aircraft under (n, 3) actions.
+    /// Makes one step of all aircraft with (n, 3) actions.
     fn step<'py>(
         &self,
         py: Python<'py>,
@@ -143,8 +143,8 @@ impl World {
     }
 }
 
-/// One step of every block. An aircraft that is lost earns what the training gives it for that, and is last
-/// seen where it was before: where it is may be no number.
+/// Makes one step of every block. A lost aircraft gets the reward that the training gives for a loss. Its last
+/// observation is that before the step, because its state may be NaN.
 fn advance(
     world: &mut dyn sim::world::World,
     instances: usize,
@@ -177,7 +177,8 @@ fn advance(
     Ok(rows)
 }
 
-/// The targets that the training of `greylag train policy` draws, or those at one airspeed as in the paper.
+/// The targets of `greylag train policy` (`envelope`), or targets at the airspeed of the start, as in the paper
+/// (`start`).
 fn targets(model: &GreyBox, seed: u64, corners: f64, airspeeds: &str) -> PyResult<Stratified> {
     if !(0.0..=1.0).contains(&corners) {
         return Err(PyValueError::new_err(format!(
@@ -194,7 +195,8 @@ fn targets(model: &GreyBox, seed: u64, corners: f64, airspeeds: &str) -> PyResul
     }
 }
 
-/// The least and the greatest observation: [`observe`] is monotonic in each of its arguments.
+/// Smallest and largest value of each observation. They are at the bounds of the state, because [`observe`] is
+/// monotonic in each of its arguments.
 fn observable(model: &GreyBox) -> [[f64; OBSERVATIONS]; 2] {
     let [least, most] = bounds();
     let figures = &model.airframe.actuators;
@@ -225,7 +227,7 @@ fn observable(model: &GreyBox) -> [[f64; OBSERVATIONS]; 2] {
     };
     let (one, other) =
         (observe(&least, &low, &wanted(&most)), observe(&most, &high, &wanted(&least)));
-    // single precision rounds what stands at a stop
+    // a margin for the rounding to single precision
     let wider = |x: f64| x + 1e-5 * x.abs().max(1.0);
     let pair = |i: usize| (one[i].min(other[i]), one[i].max(other[i]));
     [std::array::from_fn(|i| -wider(-pair(i).0)), std::array::from_fn(|i| wider(pair(i).1))]

@@ -39,6 +39,15 @@ def test_a_comparison_shows_the_better_model(here):
     assert heard and all(0 <= share <= 1 for _, share in heard)
 
 
+def test_an_end_of_an_interval_that_cannot_be_given_is_nan():
+    parameter = {"name": "a", "value": None, "ci95": [None, 1.0], "unit": ""}
+    effect = {"id": "e", "description": "", "asserted": False, "evidence": 1.0, "threshold": 2.0, "parameters": [parameter],
+              "channels": [], "indistinguishable_from": [], "heldout_error_reduction": None, "refused": []}
+    document = {"model": "m", "verdict": "unknown", "sentences": [], "effects": [effect], "notes": []}
+    found = greylag.Diagnosis._of(document).effects[0].parameters[0]
+    assert np.isnan(found.value) and np.isnan(found.ci95[0]) and found.ci95[1] == 1.0
+
+
 def test_the_missing_effect_is_found_and_added(here):
     names = run(next(example for example in EXAMPLES if "greylag.diagnose" in example))
     found, amended = names["found"], names["amended"]

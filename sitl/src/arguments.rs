@@ -6,7 +6,7 @@ use crate::airframe_file::{self, AirframeError};
 use crate::error_arguments::{FaultArgs, SensorArgs};
 use crate::parameter_file::{self, ParameterFileError};
 use crate::plant::Start;
-use crate::plant_arguments::PlantArgs;
+use crate::plant_arguments::{PlantArgs, held};
 use crate::shim::controller::FlightController;
 use crate::shim::{
     Address, ArdupilotOptions, ChannelRange, Existing, Launch, OutputMap, Pace, Personality,
@@ -30,7 +30,7 @@ pub struct Cli {
     #[arg(long, value_name = "STACK", value_enum, conflicts_with = "lockstep")]
     personality: Option<PersonalityName>,
     /// Set a parameter of that stack (may be repeated).
-    #[arg(long, value_name = "NAME=VALUE", requires = "personality", value_parser = parameter)]
+    #[arg(long, value_name = "NAME=VALUE", requires = "personality", value_parser = held)]
     parameter: Vec<(String, f64)>,
     /// Set the parameters of a file, such as params/x8/arduplane.parm: those that this stack simulates;
     /// --parameter takes precedence.
@@ -82,13 +82,6 @@ enum PersonalityName {
     Px4,
     /// ArduPilot's fixed-wing firmware, ArduPlane.
     Ardupilot,
-}
-
-/// Parses `NAME=VALUE` with a numeric value.
-fn parameter(text: &str) -> Result<(String, f64), String> {
-    let (name, value) = text.split_once('=').ok_or("write it as NAME=VALUE")?;
-    let value = value.trim().parse().map_err(|_| format!("{value} is not a number"))?;
-    Ok((name.trim().to_owned(), value))
 }
 
 /// The PX4 simulator API.
@@ -305,6 +298,16 @@ mod tests {
         let expected = [("RC_OVERRIDE_TIME", 0.4), ("FS_GCS_ENABL", 1.0), ("FS_GCS_ENABL", 0.0)];
         assert_eq!(options.parameters, expected.map(|(name, value)| (name.to_owned(), value)));
         assert_eq!(options.unplayed, ["RLL_RATE_P"]);
+    }
+
+    #[test]
+    fn a_parameter_that_is_not_finite_is_refused() {
+        for value in ["nan", "inf", "much"] {
+            let words = ["greylag-sitl", "--personality", "px4", "--parameter"];
+            let given = format!("COM_OF_LOSS_T={value}");
+            let said = Cli::try_parse_from(words.into_iter().chain([given.as_str()]));
+            assert!(said.unwrap_err().to_string().contains("not a finite number"), "{value}");
+        }
     }
 
     #[test]

@@ -67,10 +67,13 @@ struct AirArgs {
     gust: Vec<Numbers<7>>,
 }
 
-/// Parses `KEY=NAME`; KEY is one of [`Properties::KEYS`].
+/// Parses `KEY=NAME`; KEY is one of [`Properties::KEYS`], and NAME is not empty.
 pub fn property(text: &str) -> Result<(String, String), String> {
     let (key, name) = text.split_once('=').ok_or("write it as KEY=NAME")?;
     match Properties::default().name_mut(key) {
+        Some(_) if name.trim().is_empty() => {
+            Err(format!("{key} has no name; write it as KEY=NAME"))
+        }
         Some(_) => Ok((key.to_owned(), name.to_owned())),
         None => Err(format!("{key} is no key; the keys are {}", Properties::KEYS.join(", "))),
     }
@@ -136,5 +139,18 @@ impl AirArgs {
             }),
             gusts: self.gust.iter().map(gust).collect(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An empty name would be found everywhere in the aircraft's XML, and its replacement would never end.
+    #[test]
+    fn a_property_without_a_name_is_refused() {
+        assert!(property("aileron_position=").unwrap_err().contains("has no name"));
+        assert!(property("aileron_position= ").is_err());
+        assert!(property("aileron_position=fcs/a").is_ok() && property("flap=fcs/a").is_err());
     }
 }

@@ -61,9 +61,13 @@ impl CampaignReport<'_> {
 
     /// Section with the learning curves of each stage; `None` if no stage has any.
     fn curves(&self) -> Option<Section> {
-        let mut stages: Vec<&str> =
-            self.records.iter().filter(|r| !r.curve.is_empty()).map(|r| r.stage.as_str()).collect();
-        stages.dedup();
+        let mut stages: Vec<&str> = Vec::new();
+        // the records of several machines may be interleaved
+        for record in self.records.iter().filter(|r| !r.curve.is_empty()) {
+            if !stages.contains(&record.stage.as_str()) {
+                stages.push(&record.stage);
+            }
+        }
         let quantities = [
             ("easy_deg", "settled error, easy targets (°)"),
             ("hard_deg", "settled error, hard targets (°)"),
@@ -86,8 +90,8 @@ impl CampaignReport<'_> {
             let name = levels.map(|(_, level)| level.as_str()).collect::<Vec<_>>().join("/");
             groups.entry(name).or_default().push(record);
         }
-        let mut x: Vec<f64> =
-            groups.values().flatten().flat_map(|r| r.curve["steps"].iter().copied()).collect();
+        let steps = |r: &&Record| r.curve.get("steps").cloned().unwrap_or_default();
+        let mut x: Vec<f64> = groups.values().flatten().flat_map(steps).collect();
         x.sort_by(f64::total_cmp);
         x.dedup();
         let mut figure = Curves {
@@ -186,7 +190,7 @@ impl CampaignReport<'_> {
 /// The interquartile mean of a column over the seeds at `steps`; `None` unless every seed has a value there.
 fn middle(records: &[&Record], column: &str, steps: f64) -> Option<Estimate> {
     let value = |record: &&Record| {
-        let at = record.curve["steps"].iter().position(|s| *s == steps)?;
+        let at = record.curve.get("steps")?.iter().position(|s| *s == steps)?;
         record.curve.get(column)?.get(at).copied()
     };
     let values: Vec<f64> = records.iter().map(value).collect::<Option<_>>()?;
@@ -277,4 +281,30 @@ fn cells(row: &SummaryRow) -> Vec<String> {
     cells.push(format!("{}, {}", number(ours.min), number(ours.max)));
     cells.extend(row.paper.iter().map(|p| p.as_ref().map_or("–".into(), text)));
     cells
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_without_steps_has_no_mean() {
+        let record = |column: &str| Record {
+            schema: Record::SCHEMA.into(),
+            campaign: "c".into(),
+            cell: "cell".into(),
+            stage: "train".into(),
+            levels: BTreeMap::new(),
+            seed: Some(1),
+            identity: String::new(),
+            program: String::new(),
+            command: String::new(),
+            inputs: BTreeMap::new(),
+            files: BTreeMap::new(),
+            metrics: BTreeMap::new(),
+            curve: BTreeMap::from([(column.to_owned(), vec![1.0])]),
+        };
+        assert!(middle(&[&record("easy_deg")], "easy_deg", 1.0).is_none());
+        assert!(middle(&[&record("steps")], "steps", 1.0).is_some());
+    }
 }

@@ -12,7 +12,7 @@ use super::{
 use crate::kit::numbers::number;
 use greylag_control::Target;
 use greylag_model::STEP;
-use greylag_sim::evaluation::{Evaluation, Score};
+use greylag_sim::evaluation::Evaluation;
 use greylag_sim::published::{Published, Value, published};
 use greylag_sim::tracking::{Tracking, seconds};
 
@@ -65,18 +65,14 @@ impl EvaluationReport<'_> {
         first.groups.iter().map(|score| score.targets.as_str()).collect()
     }
 
-    /// The score of each evaluation for a group, with the name of the controller.
-    fn scores_of<'a>(&'a self, group: &'a str) -> impl Iterator<Item = (String, &'a Score)> {
-        self.evaluations.iter().filter_map(move |e| Some((label(e), e.score(group)?)))
-    }
-
     fn intervals(&self) -> Section {
         let figures = self.groups().into_iter().map(|group| {
             let mut rows = Vec::new();
-            for (evaluation, (name, score)) in self.evaluations.iter().zip(self.scores_of(group)) {
+            for e in self.evaluations {
+                let Some(score) = e.score(group) else { continue };
                 let ours = Value { value: score.iqm_deg, ci95: score.iqm_ci95_deg };
-                rows.push(whisker(name, Style::Actual, ours));
-                if let Some(p) = published(&evaluation.controller, group) {
+                rows.push(whisker(label(e), Style::Actual, ours));
+                if let Some(p) = published(&e.controller, group) {
                     let name = format!("{} in the paper", p.controller);
                     rows.push(whisker(name, Style::Measured, p.iqm_deg));
                 }
@@ -308,6 +304,27 @@ mod tests {
         // a controller that leaves the envelope in up to one flight in twenty keeps its rank
         all[0].groups.iter_mut().for_each(|s| s.kept_rate = 0.96);
         assert_eq!(answer::best(&all).unwrap().controller, "lqi");
+    }
+
+    #[test]
+    fn the_papers_result_stays_beside_its_controller_where_another_lacks_the_group() {
+        let mut evaluations =
+            [evaluated("lqi", 0.1), evaluated("lqi", 0.2), evaluated("hybrid", 0.25)];
+        evaluations[1].groups.retain(|score| score.targets != "easy");
+        let report = EvaluationReport {
+            subtitle: String::new(),
+            evaluations: &evaluations,
+            flights: &[],
+            next: String::new(),
+            provenance: Vec::new(),
+        };
+        let section = report.intervals();
+        let easy = section.figures.iter().find_map(|figure| match figure {
+            Figure::Whiskers(whiskers) if whiskers.title == "easy" => Some(whiskers),
+            _ => None,
+        });
+        let labels: Vec<&str> = easy.unwrap().rows.iter().map(|r| r.label.as_str()).collect();
+        assert_eq!(labels.last(), Some(&"hybrid in the paper"), "{labels:?}");
     }
 
     /// The page shows every controller with its interval and the paper's result. It contains no NaN for a flight that ends early.

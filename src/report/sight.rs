@@ -39,7 +39,8 @@ impl Sight {
         let [x, y] = all;
         let [chosen_x, chosen_y] = line(&self.insight.chosen);
         let chosen = if self.insight.searched { "plan flown" } else { "the LQI flies" };
-        let ends = [self.time_s, self.time_s + (self.insight.chosen.len() - 1) as f64 * STEP];
+        let steps = self.insight.chosen.len().saturating_sub(1);
+        let ends = [self.time_s, self.time_s + steps as f64 * STEP];
         let series =
             |label: &str, style, mark, x, y| XySeries { label: label.into(), style, mark, x, y };
         Figure::Xy(XyFigure {
@@ -75,4 +76,22 @@ pub(super) fn phases<'a>(sights: impl IntoIterator<Item = &'a Sight>) -> Table {
         table.push(std::iter::once(number(sight.time_s)).chain(parts));
     }
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_planner_without_a_plan_is_drawn() {
+        let insight = Insight {
+            candidates: Vec::new(),
+            chosen: Vec::new(),
+            searched: false,
+            phases: Vec::new(),
+        };
+        let sight = Sight { time_s: 2.0, target: [0.1, 0.2], insight };
+        let [Figure::Xy(roll), _] = sight.fans() else { panic!("two figures") };
+        assert_eq!(roll.series[1].x, [2.0, 2.0]);
+    }
 }

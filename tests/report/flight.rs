@@ -217,7 +217,11 @@ fn a_flight_without_samples_is_still_a_page() {
     let empty = Flight::default();
     let mut report = report_synthetic::report(&empty);
     report.timing.as_mut().unwrap().cycles.clear();
-    assert_well_formed(&report.page().render());
+    let html = report.page().render();
+    assert_well_formed(&html);
+    // no cycle was timed: the page must not say that none was late
+    assert!(html.contains("loop timing was not recorded") && !html.contains("no late cycle"));
+    assert!(!html.contains("NaN ms"));
 
     let broken = Flight::from(vec![Sample::default(); 3]);
     let mut report = report_synthetic::report(&broken);

@@ -26,6 +26,12 @@ def _read(kind: type[_T], found: dict[str, Any], /, **more: Any) -> _T:
     return kind(**given, **more)
 
 
+def _interval(found: list[float | None]) -> tuple[float, float]:
+    """The ends of an interval; an end that cannot be given (``null``) is NaN."""
+    low, high = (float("nan") if end is None else end for end in found)
+    return low, high
+
+
 def _table(rows: list[dict[str, Any]]) -> pd.DataFrame:
     import pandas as pd
 
@@ -217,7 +223,7 @@ class Diagnosis:
     model: str
     """The model's name."""
     verdict: str
-    """``effect``, ``adequate`` or ``unexplained``."""
+    """``effect``, ``adequate``, ``unexplained``, or ``unknown`` if the flights allow no verdict."""
     sentences: list[str]
     """The answer in plain words, the most important first."""
     effects: list[Candidate]
@@ -230,7 +236,7 @@ class Diagnosis:
     @classmethod
     def _of(cls, document: dict[str, Any]) -> Diagnosis:
         def candidate(found: dict[str, Any]) -> Candidate:
-            parameters = [_read(Parameter, p, ci95=tuple(p["ci95"])) for p in found["parameters"]]
+            parameters = [_read(Parameter, p, ci95=_interval(p["ci95"])) for p in found["parameters"]]
             return _read(Candidate, found, parameters=parameters)
 
         effects = [candidate(found) for found in document["effects"]]
@@ -299,7 +305,7 @@ class Amendment:
 
     @classmethod
     def _of(cls, document: dict[str, Any], path: Path) -> Amendment:
-        parameters = [_read(FittedParameter, p, ci95=tuple(p["ci95"])) for p in document["parameters"]]
+        parameters = [_read(FittedParameter, p, ci95=_interval(p["ci95"])) for p in document["parameters"]]
         effects = document["effects"]
         return _read(
             cls,

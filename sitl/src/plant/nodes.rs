@@ -182,8 +182,9 @@ impl Nodes {
         }
         let [north, east, _] = wind;
         if north == 0.0 {
-            // JSBSim keeps the previous direction then (findings/jsbsim-wind-direction.sh), here that of the rounding error which
-            // the initial condition leaves in the wind. Turbulence goes by it.
+            // For a wind without a north component, JSBSim keeps the previous direction
+            // (findings/jsbsim-wind-direction.sh). Here it is that of a rounding error of the initial condition. The
+            // turbulence depends on the direction.
             fdm.set_property("atmosphere/psiw-rad", east.atan2(0.0))?;
         }
         if wind != [0.0; 3] {

@@ -1,9 +1,10 @@
-//! Brings propellers to speed that stand still after the start of their engines.
+//! Spins up propellers that are at rest after the start of their engines.
 //!
-//! JSBSim's electric engine is a source of constant power: its torque is the power over the speed of the propeller, at least 1 rad/s.
-//! The first frame of a propeller at rest adds P·dt/J to its speed, 130,000 rpm for a model aircraft in steps of 10 ms, and the
-//! state is no number a tenth of a second later (`findings/jsbsim-electric-standstill.sh`). In steps of a hundredth the propeller
-//! speeds up as it should. Once it windmills, the usual step is stable at full throttle (tested).
+//! JSBSim's electric engine is a source of constant power: its torque is the power divided by the propeller's speed, of
+//! which JSBSim takes at least 1 rad/s. The first frame therefore adds P·dt/J to the speed of a propeller at rest. For
+//! a model aircraft in steps of 10 ms this is 130,000 rpm, and the state is NaN 0.1 s later
+//! (`findings/jsbsim-electric-standstill.sh`). In steps of a hundredth of that length, the propeller accelerates
+//! correctly. Once it windmills, the usual step is stable at full throttle (`sitl/tests/plant/electric.rs`).
 
 use jsbsim::NodeId;
 
@@ -19,13 +20,13 @@ const THROTTLE: f64 = 0.1;
 const FINE: f64 = 0.01;
 /// Largest number of frames of the spin-up.
 const FRAMES: usize = 3000;
-/// Relative change of a propeller's speed per frame below which it counts as up to speed.
+/// Relative change of a propeller's speed per frame below which its speed counts as steady.
 const STEADY: f64 = 2e-3;
-/// Frames for the throttle to close again; no throttle may be slower.
+/// Number of frames in which the throttle closes again; a slower throttle is still partly open at the start.
 const CLOSING: usize = 200;
 
 impl Plant {
-    /// Turns propellers that stand still although their engines run, with the aircraft held in its state, and closes the throttle.
+    /// Spins up the propellers at rest, with the aircraft held in its state, and closes the throttle again.
     ///
     /// # Errors
     /// [`PlantError::Jsbsim`] if JSBSim fails.
@@ -38,7 +39,7 @@ impl Plant {
         self.held(|plant| {
             plant.fdm.set_dt(FINE * step_s);
             let turned = plant.turn(&at_rest);
-            // the filters of the throttle go on, the propellers keep their speed
+            // in steps this short, the filters of the throttle settle while the propellers keep their speed
             plant.fdm.set_dt(STILL_S);
             let closed = turned.and_then(|()| plant.run_at(0.0, CLOSING));
             plant.fdm.set_dt(step_s);
@@ -47,7 +48,7 @@ impl Plant {
         settle(&mut self.fdm, step_s).map_err(jsbsim("setting the start"))
     }
 
-    /// Speeds of the propellers that do not turn.
+    /// Properties of the speeds of the propellers at rest.
     fn propellers_at_rest(&mut self) -> Result<Vec<NodeId>, jsbsim::Error> {
         let name = |engine: usize| format!("propulsion/engine[{engine}]/propeller-rpm");
         let all: Vec<NodeId> = (0..).map_while(|engine| look(&self.fdm, &name(engine))).collect();
@@ -60,7 +61,7 @@ impl Plant {
         Ok(found)
     }
 
-    /// Opens the throttle until the propellers of `speeds` are up to speed.
+    /// Opens the throttle until the speeds of the propellers are steady; `speeds` are their properties.
     fn turn(&mut self, speeds: &[NodeId]) -> Result<(), jsbsim::Error> {
         let mut last = vec![0.0; speeds.len()];
         for _ in 0..FRAMES {

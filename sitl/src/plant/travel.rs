@@ -107,8 +107,8 @@ impl Plant {
         })
     }
 
-    /// Deflections of aileron, elevator and rudder at rest at `command`, rad, each control alone: on a V-tail or on elevons they would
-    /// move one surface together, or reach its stop too early.
+    /// Deflections of aileron, elevator and rudder at rest at `command`, rad. Each control is commanded alone, because
+    /// two controls of a V-tail or of elevons move the same surfaces, which would reach their stops too early.
     fn stops(&mut self, command: f64) -> Result<[f64; 3], PlantError> {
         let none = Inputs::default();
         Ok([

@@ -236,6 +236,10 @@ impl ShimOptions {
             self.personality.is_none() || self.pace == Pace::RealTime,
             "a personality flies in real time, as the flight controller that it simulates does",
         )?;
+        demand(
+            self.personality.is_none() || self.frames_are_spared(),
+            "a personality sends its messages on time: leave --delay-ms, --drop, --jitter-ms and --late out",
+        )?;
         // The upper limit is about ten thousand years, whose microseconds fit into 64 bits.
         demand(
             (0.0..=3.2e11).contains(&self.clock_start_s),
@@ -243,7 +247,7 @@ impl ShimOptions {
         )?;
         let bias = &self.bias;
         let mut biases = vec![bias.alpha_rad, bias.beta_rad, bias.airspeed_scale];
-        biases.extend(bias.gyro_radps.iter().chain(&bias.accelerometer_mps2));
+        biases.extend([bias.gyro_radps, bias.accelerometer_mps2, bias.attitude_rad].concat());
         demand(biases.iter().all(|x| x.is_finite()), "a bias must be a finite number")?;
         demand(bias.airspeed_scale > 0.0, "the airspeed scale must be positive")?;
         demand(
@@ -270,6 +274,10 @@ impl ShimOptions {
 
     /// Checks that the simulator interfaces of PX4 and ArduPilot support the options.
     fn check_simulators(&self) -> Result<(), ShimError> {
+        demand(
+            self.clock_start_s == 0.0 || (self.px4.is_none() && self.ardupilot.is_none()),
+            "PX4 and ArduPilot have clocks of their own: leave --clock-start-s out",
+        )?;
         if let Some(px4) = &self.px4 {
             demand(
                 self.link.transport == Transport::TcpIn,
@@ -282,6 +290,11 @@ impl ShimOptions {
             demand(
                 self.frames_are_spared() && self.noise == Noise::NONE,
                 "the PX4 simulator API sends every message, with noise of its own (--px4-noise)",
+            )?;
+            demand(
+                self.bias.attitude_rad == [0.0; 3]
+                    && [self.bias.alpha_rad, self.bias.beta_rad] == [0.0; 2],
+                "PX4 gets no attitude and no flow angles at its simulator API: leave their biases out",
             )?;
             demand(
                 px4.outputs.highest() <= 16,

@@ -34,7 +34,8 @@ const AIRCRAFT: &str = r#"<fdm_config name="toy" version="2.0">
 <property>aero/qbar-area</property><value>0.05</value></product></function></axis></aerodynamics>
 </fdm_config>"#;
 
-/// From rest the first frame of full throttle would make 300,000 rpm and hundreds of times the weight.
+/// For a propeller at rest, the first frame at full throttle would give 300,000 rpm and a thrust of hundreds of times
+/// the weight.
 #[test]
 fn a_flight_begins_with_a_turning_propeller() {
     let tree = tempfile::tempdir().unwrap();

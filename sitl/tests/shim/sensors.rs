@@ -2,7 +2,9 @@
 
 use crate::shim_companion::*;
 use greylag_sitl::plant::PlantOptions;
-use greylag_sitl::shim::{self, Bias, Existing, Noise, ShimError, ShimOptions, TruthFile};
+use greylag_sitl::shim::{
+    self, Bias, Existing, Noise, Pace, Personality, ShimError, ShimOptions, TruthFile,
+};
 use std::sync::atomic::AtomicBool;
 
 /// Frames while the aircraft is held at its start, so only the sensor errors vary.
@@ -144,8 +146,14 @@ fn options_that_mean_nothing_are_refused_before_anything_is_opened() {
     refused(|o| o.faults.drop_probability = 1.0);
     refused(|o| o.faults.delay_ms = 1e9);
     refused(|o| o.faults.late_probability = 1.5);
+    refused(|o| {
+        o.pace = Pace::RealTime;
+        o.personality = Some(Personality::Px4);
+        o.faults.drop_probability = 0.1;
+    });
     refused(|o| o.bias.airspeed_scale = 0.0);
     refused(|o| o.bias.alpha_rad = f64::INFINITY);
+    refused(|o| o.bias.attitude_rad[1] = f64::NAN);
     refused(|o| o.duration_s = Some(0.0));
     refused(|o| o.start.airspeed_mps = 0.0);
     refused(|o| o.start.altitude_m = f64::NAN);

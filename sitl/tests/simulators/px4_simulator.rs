@@ -307,6 +307,8 @@ fn what_cannot_be_is_refused_before_anything_is_opened() {
     };
     refused(|o| o.link = "udpin:127.0.0.1:0".parse().unwrap(), "tcpin");
     refused(|o| o.faults.drop_probability = 0.1, "--px4-noise");
+    refused(|o| o.bias.alpha_rad = 0.01, "flow angles");
+    refused(|o| o.clock_start_s = 10.0, "--clock-start-s");
     refused(|o| o.personality = Some(greylag_sitl::shim::Personality::Px4), "--personality");
 }
 

@@ -1,10 +1,12 @@
 //! Tests of the shim in real time over real sockets: time advances by the wall clock, independent of the companion.
 
+use std::net::UdpSocket;
 use std::time::{Duration, Instant};
 
 use crate::real_time;
 use crate::shim_companion::*;
-use greylag_sitl::shim::{Event, Launch};
+use greylag_sitl::shim::codec::{Encoder, Heartbeat};
+use greylag_sitl::shim::{Event, Launch, Personality};
 
 const STEP_US: u64 = 10_000;
 
@@ -191,6 +193,27 @@ fn late_frames_hold_up_those_behind_them_and_none_is_lost() {
     assert_eq!(summary.dropped_frames, 0);
 }
 
+fn garbage_does_not_take_the_link_of_a_flight_controller() {
+    let mut options = real_time("udpin:127.0.0.1:0");
+    options.personality = Some(Personality::Px4);
+    let shim = Shim::start(options);
+    let to = shim.address();
+    let [companion, stranger] =
+        [(), ()].map(|()| UdpSocket::bind("127.0.0.1:0").expect("a socket"));
+    companion.set_read_timeout(Some(PATIENCE)).expect("set");
+    let (mut beat, mut buffer) = (Vec::new(), [0; 2048]);
+    Encoder::new(255, 190).encode(&Heartbeat::default(), &mut beat);
+    companion.send_to(&beat, to).expect("sent");
+    companion.recv(&mut buffer).expect("telemetry");
+    stranger.send_to(b"rubbish", to).expect("sent");
+    std::thread::sleep(Duration::from_millis(500));
+    companion.set_nonblocking(true).expect("set");
+    while companion.recv(&mut buffer).is_ok() {}
+    companion.set_nonblocking(false).expect("set");
+    companion.recv(&mut buffer).expect("telemetry goes on");
+    shim.stop();
+}
+
 /// Run with `cargo test -p greylag-sitl --release --test simulators shim:: -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes a minute; prints the punctuality of the clock on this machine"]
@@ -212,4 +235,5 @@ real_time::tests!(
     frames_are_delayed_and_dropped_as_asked,
     over_tcp_a_companion_that_does_not_read_costs_no_cycle,
     late_frames_hold_up_those_behind_them_and_none_is_lost,
+    garbage_does_not_take_the_link_of_a_flight_controller,
 );

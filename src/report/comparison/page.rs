@@ -20,7 +20,7 @@ pub fn comparison_page(report: &ComparisonReport) -> Page {
     let answer = c.answer.clone();
     let boxed = AnswerBox { answer, place: place::of_models(&c.models), first: First::Error };
     let answer = Figure::Answer(Box::new(boxed));
-    // of one model the box above says where it fails
+    // for a single model, the box above names the worst channel
     let leading = if c.models.len() == 1 { 0 } else { LEADING };
     let mut said = findings(c, leading);
     if let [only] = &c.models[..] {

@@ -3,8 +3,8 @@
 use crate::kit::numbers::number;
 use greylag_sysid::compare::{ChannelId, ModelResult};
 
-/// Share above which the sentence gives the error in multiples of the measured variation: a percentage of five digits says
-/// nothing.
+/// Share above which the sentence gives the error as a multiple of the measured variation, because a percentage of four
+/// or more digits is hard to read.
 const MULTIPLE: f64 = 10.0;
 
 /// Channel in which the model leaves the largest share unexplained, and this share. `None` without finite shares.

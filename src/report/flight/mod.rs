@@ -149,6 +149,11 @@ impl FlightReport<'_> {
         self.segments.iter().filter(|s| s.tracked(self.tolerance_rad)).count()
     }
 
+    /// Durations of the control cycles; `None` if no cycle was recorded.
+    pub(crate) fn timed(&self) -> Option<&LoopTiming> {
+        self.timing.as_ref().filter(|timing| !timing.cycles.is_empty())
+    }
+
     /// Measures of the transient to each target, in the order of the segments; `None` if the aircraft's limits are not known.
     pub fn qualities(&self) -> Option<Vec<Quality>> {
         let limits = self.envelope?.limits;

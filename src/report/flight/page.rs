@@ -8,6 +8,8 @@ use crate::{
     Align, Band, Choice, ChoiceOption, Figure, Histogram, LoopTiming, Mark, Page, Panel, Rule,
     Scale, Section, Series, Sight, Style, Table, TimeFigure, sight,
 };
+use greylag_control::Target;
+use greylag_control::quality::attitude_error_deg;
 use greylag_logs::Sample;
 
 /// Gap above which the lines are interrupted, s; the flight-log format splits a flight at the same gap.
@@ -20,7 +22,7 @@ pub(crate) fn page(report: &FlightReport) -> Page {
     sections.push(attitude(report));
     sections.extend(quality::section(report));
     sections.extend([air_data(report), surfaces(report)]);
-    sections.extend(report.timing.as_ref().map(|t| loop_timing(report, t)));
+    sections.extend(report.timed().map(|t| loop_timing(report, t)));
     if !report.segments.is_empty() {
         sections.push(targets::section(report));
     }
@@ -129,7 +131,11 @@ fn angle_panel(title: &str, tolerance_rad: f64, (actual, command): &(Vec<f64>, V
 }
 
 fn error_panel(title: &str, tolerance_rad: f64, (actual, command): &(Vec<f64>, Vec<f64>)) -> Panel {
-    let size = |(a, c): (&f64, &f64)| (a - c).to_degrees().abs();
+    // wrapped to ±180°, as in the settled error: an inverted aircraft passes through the jump of the roll angle
+    let size = |(a, c): (&f64, &f64)| {
+        let target = Target { roll: *c, pitch: 0.0, airspeed: f64::NAN };
+        attitude_error_deg([*a, 0.0], &target)[0].abs()
+    };
     let error = actual.iter().zip(command).map(size).collect();
     let tolerance = tolerance_rad.to_degrees();
     Panel {
@@ -260,7 +266,7 @@ fn events(report: &FlightReport) -> Section {
     for (i, e) in report.events.iter().enumerate() {
         table.push([
             (i + 1).to_string(),
-            format!("{:.2}", e.time_s),
+            if e.time_s.is_finite() { format!("{:.2}", e.time_s) } else { "–".into() },
             e.kind.name().into(),
             e.text.clone(),
         ]);
@@ -284,4 +290,19 @@ fn provenance(report: &FlightReport) -> Section {
     }
     push("Plots", "uPlot 1.6.32 (MIT)".into());
     Section::new("Provenance", "", vec![Figure::Table(table)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_error_across_the_jump_of_the_roll_angle_is_small() {
+        let angles = [179.0, -20.0, f64::NAN].map(f64::to_radians).to_vec();
+        let commands = [-179.0, 10.0, 0.0].map(f64::to_radians).to_vec();
+        let panel = error_panel("Roll error", 0.01, &(angles, commands));
+        let error = &panel.series[0].values;
+        assert!((error[0] - 2.0).abs() < 1e-9 && (error[1] - 30.0).abs() < 1e-9, "{error:?}");
+        assert!(error[2].is_nan());
+    }
 }

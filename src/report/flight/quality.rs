@@ -22,6 +22,8 @@ pub(crate) struct Kept {
     pub alpha_deg: f64,
     /// Time outside each limit, s.
     pub outside_s: OutsideS,
+    /// Whether any sample counts as flight; without one, nothing was compared with the limits.
+    pub judged: bool,
     /// Whether load factor and angle of attack exceeded their limits by at most 5 % (`quality::TRANSIENT`).
     pub kept: bool,
 }
@@ -66,6 +68,7 @@ pub(crate) fn kept(samples: &[Sample], envelope: &EnvelopeFlown) -> Kept {
         load_factor: [f64::NAN; 2],
         alpha_deg: f64::NAN,
         outside_s: OutsideS::default(),
+        judged: false,
         kept: true,
     };
     for part in parts {
@@ -77,6 +80,7 @@ pub(crate) fn kept(samples: &[Sample], envelope: &EnvelopeFlown) -> Kept {
         all.alpha_deg = all.alpha_deg.max(alpha_deg[1]);
         all.outside_s = all.outside_s.plus(outside_s);
         all.kept &= kept;
+        all.judged = true;
     }
     all
 }
@@ -88,6 +92,9 @@ pub(super) fn clause(kept: &Kept, limits: &Limits) -> String {
             if limit.is_finite() { format!(" of {}{unit}", number(limit)) } else { String::new() };
         format!("{}{unit}{stated}", number(value))
     };
+    if !kept.judged {
+        return "the envelope was not judged: no sample counts as flight".into();
+    }
     let seconds = kept.outside_s.any;
     let outside = match seconds {
         0.0 => "inside the envelope".to_owned(),
@@ -161,4 +168,29 @@ pub(crate) fn section(report: &FlightReport) -> Option<Section> {
         range(limits.pitch_deg),
     );
     Some(Section::new("Transient response", &note, vec![Figure::Table(table)]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_a_sample_in_flight_the_envelope_is_not_judged() {
+        let limits = Limits {
+            bank_deg: 60.0,
+            pitch_deg: [-30.0, 30.0],
+            load_factor: [-1.0, 2.2],
+            stall_deg: 12.3,
+            sideslip_deg: 20.0,
+            airspeed_mps: [12.0, 30.0],
+            slew_per_s: 5.0,
+        };
+        let said = |airspeed_mps: f64| {
+            let at = |time_s: f64| Sample { time_s, airspeed_mps, ..Sample::default() };
+            let samples = [at(0.0), at(0.01), at(0.02)];
+            clause(&kept(&samples, &EnvelopeFlown { limits, flying_from_mps: 8.0 }), &limits)
+        };
+        assert!(said(3.0).starts_with("the envelope was not judged"), "{}", said(3.0));
+        assert!(said(20.0).starts_with("inside the envelope"), "{}", said(20.0));
+    }
 }

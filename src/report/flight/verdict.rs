@@ -33,7 +33,7 @@ impl Parts {
             _ => format!("Tracked {tracked} of {all} targets"),
         }];
         first.extend(settled_by_difficulty(&report.segments));
-        first.push(match report.timing.as_ref().map(LoopTiming::late) {
+        first.push(match report.timed().map(LoopTiming::late) {
             None => "loop timing was not recorded".into(),
             Some(0) => "no late cycle".into(),
             Some(1) => "1 late cycle".into(),
@@ -41,7 +41,7 @@ impl Parts {
         });
         let envelope =
             report.envelope.map(|e| clause(&kept(&report.flight.samples, &e), &e.limits));
-        let timed = report.timing.as_ref().filter(|_| report.envelope.is_some());
+        let timed = report.timed().filter(|_| report.envelope.is_some());
         let latency = timed.map(|timing| {
             let [p50, p999] = timing.percentiles_us([0.5, 0.999]).map(|us| us / 1e3);
             let budget = number(timing.budget_us / 1e3);
@@ -67,14 +67,16 @@ pub(crate) fn sentence(report: &FlightReport) -> String {
 
 pub(crate) fn verdict(report: &FlightReport) -> Verdict {
     let (tracked, all) = (report.tracked(), report.segments.len());
-    let late = report.timing.as_ref().map(LoopTiming::late);
-    let kept = report.envelope.map(|e| kept(&report.flight.samples, &e).kept);
+    let late = report.timed().map(LoopTiming::late);
+    let judged = report.envelope.map(|e| kept(&report.flight.samples, &e)).filter(|k| k.judged);
+    let kept = judged.map(|k| k.kept);
     let reason = reason(all - tracked, late, kept);
     let outcome = match (all, late) {
         _ if tracked < all => Outcome::Missed,
         _ if kept == Some(false) => Outcome::Missed,
         (_, Some(1..)) => Outcome::Missed,
         (0, _) | (_, None) => Outcome::Open,
+        _ if report.envelope.is_some() && kept.is_none() => Outcome::Open,
         _ => Outcome::Reached,
     };
     let Parts { first, beside } = Parts::of(report);
@@ -151,8 +153,8 @@ fn details(report: &FlightReport) -> Vec<String> {
             100.0 * TRANSIENT
         ));
     }
-    // with an envelope, the latency stands among the measurements already
-    if let Some(timing) = report.timing.as_ref().filter(|_| report.envelope.is_none()) {
+    // with an envelope, the measurements already contain the latency
+    if let Some(timing) = report.timed().filter(|_| report.envelope.is_none()) {
         let [p50, p99, p999] = timing.percentiles_us([0.5, 0.99, 0.999]).map(|us| us / 1e3);
         details.push(format!(
             "Loop, {}: p50 {p50:.2} ms, p99 {p99:.2} ms, p99.9 {p999:.2} ms of {} ms.",

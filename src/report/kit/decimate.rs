@@ -1,5 +1,7 @@
 //! Selects rows for plots: in time order, separated at gaps, thinned without loss of extremes.
 
+use std::ops::Range;
+
 /// Indices of the rows whose times ascend, with `None` between two rows that are more than `gap_s`, s, apart.
 pub(crate) fn rows_in_order(time_s: &[f64], gap_s: f64) -> Vec<Option<usize>> {
     let mut rows = Vec::with_capacity(time_s.len());
@@ -33,9 +35,33 @@ pub(crate) fn values_of(rows: &[Option<usize>], values: &[f64]) -> Vec<f64> {
     rows.iter().map(|row| row.and_then(|i| values.get(i)).copied().unwrap_or(f64::NAN)).collect()
 }
 
-/// Two values for every `group` values: the smallest and the largest, in their original order; NaN without finite values.
-pub(crate) fn extremes(values: &[f64], group: usize) -> Vec<f64> {
-    values.chunks(group).flat_map(pair_of_extremes).collect()
+/// Consecutive groups of at most `size` rows, as ranges of positions in `rows`. The first gap of every `size` rows is a
+/// group of its own, so that it stays a gap in the thinned rows.
+pub(crate) fn groups(rows: &[Option<usize>], size: usize) -> Vec<Range<usize>> {
+    let mut groups = Vec::new();
+    for (k, chunk) in rows.chunks(size).enumerate() {
+        let (start, end) = (k * size, k * size + chunk.len());
+        match chunk.iter().position(Option::is_none) {
+            None => groups.push(start..end),
+            Some(at) => {
+                let gap = start + at;
+                groups.extend([start..gap, gap..gap + 1, gap + 1..end]);
+            }
+        }
+    }
+    groups.retain(|group| !group.is_empty());
+    groups
+}
+
+/// Two values for every group: the smallest and the largest, in their original order; NaN without finite values. A
+/// group of a single row gives one value.
+pub(crate) fn extremes(values: &[f64], groups: &[Range<usize>]) -> Vec<f64> {
+    let mut thin = Vec::with_capacity(2 * groups.len());
+    for group in groups {
+        let pair = pair_of_extremes(&values[group.clone()]);
+        thin.extend_from_slice(&pair[..group.len().min(2)]);
+    }
+    thin
 }
 
 fn pair_of_extremes(chunk: &[f64]) -> [f64; 2] {
@@ -49,17 +75,17 @@ fn pair_of_extremes(chunk: &[f64]) -> [f64; 2] {
     }
 }
 
-/// The times for the values of [`extremes`], s: the start and the middle of every group.
-pub(crate) fn pair_times(time_s: &[f64], group: usize) -> Vec<f64> {
-    time_s
-        .chunks(group)
-        .flat_map(|chunk| {
-            let (first, last) = (chunk[0], chunk[chunk.len() - 1]);
-            // A last group of a single row also needs two ascending times.
-            let middle = if last > first { 0.5 * (first + last) } else { first + 1e-3 };
-            [first, middle]
-        })
-        .collect()
+/// The times for the values of [`extremes`], s: the start and the middle of every group, or the time of a single row.
+pub(crate) fn pair_times(time_s: &[f64], groups: &[Range<usize>]) -> Vec<f64> {
+    let mut times = Vec::with_capacity(2 * groups.len());
+    for group in groups {
+        let (first, last) = (time_s[group.start], time_s[group.end - 1]);
+        times.push(first);
+        if group.len() > 1 {
+            times.push(0.5 * (first + last));
+        }
+    }
+    times
 }
 
 #[cfg(test)]
@@ -83,12 +109,28 @@ mod tests {
         let mut values = vec![0.0; 1000];
         values[503] = 9.0;
         values[504] = -7.0;
-        let thin = extremes(&values, 10);
+        let rows: Vec<Option<usize>> = (0..1000).map(Some).collect();
+        let tens = groups(&rows, 10);
+        let thin = extremes(&values, &tens);
         assert_eq!(thin.len(), 200);
         assert_eq!(thin[100..102], [9.0, -7.0]);
         let time: Vec<f64> = (0..1000).map(f64::from).collect();
-        let thin_time = pair_times(&time, 10);
+        let thin_time = pair_times(&time, &tens);
         assert_eq!(thin_time.len(), thin.len());
         assert!(thin_time.windows(2).all(|w| w[0] < w[1]));
+    }
+
+    #[test]
+    fn a_gap_within_a_group_interrupts_the_thinned_line() {
+        let at = |i: i32| 0.01 * f64::from(i) + if i < 47 { 0.0 } else { 1.0 };
+        let time: Vec<f64> = (0..100).map(at).collect();
+        let rows = rows_in_order(&time, 0.1);
+        let tens = groups(&rows, 10);
+        let thin = extremes(&values_of(&rows, &[1.0; 100]), &tens);
+        let thin_time = pair_times(&times_of(&rows, &time), &tens);
+        assert_eq!(thin_time.len(), thin.len());
+        assert!(thin_time.windows(2).all(|w| w[0] < w[1]));
+        let gap = thin.iter().position(|v| v.is_nan()).expect("a gap");
+        assert!(thin_time[gap - 1] < 0.47 && thin_time[gap + 1] > 1.46, "{thin_time:?}");
     }
 }

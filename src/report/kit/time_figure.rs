@@ -139,14 +139,15 @@ impl TimeFigure {
         }
         if time.len() > DRAWN_ROWS {
             let group = (2 * time.len()).div_ceil(DRAWN_ROWS);
+            let groups = decimate::groups(&rows, group);
             self.notes.push(format!(
                 "Drawn from the smallest and largest of every {group} samples; \
                  the flight log holds all {kept}."
             ));
             for series in panels.iter_mut().flat_map(|p| &mut p.series) {
-                series.values = decimate::extremes(&series.values, group);
+                series.values = decimate::extremes(&series.values, &groups);
             }
-            time = decimate::pair_times(&time, group);
+            time = decimate::pair_times(&time, &groups);
         }
         self.tracks.push(Track { time_s: time, panels });
     }

@@ -172,7 +172,8 @@ impl TimeLine {
         if low > high {
             return String::new();
         }
-        let room = 0.08 * (high - low).max(1.0);
+        // relative to the values as well: the range of a large constant must not vanish in rounding
+        let room = 0.08 * (high - low).max(1.0).max(1e-6 * low.abs().max(high.abs()));
         let range = [low - room, high + room];
         let key: String = match panel.lines.len() {
             1 => String::new(),
@@ -212,7 +213,9 @@ impl TimeLine {
     fn line(&self, line: &TraceLine, [low, high]: [f64; 2]) -> String {
         let every = line.points.len().div_ceil(POINTS).max(1);
         let mut pieces: Vec<Vec<String>> = vec![Vec::new()];
-        for [t, x] in line.points.iter().step_by(every).filter(|[t, _]| *t <= self.span_s[1]) {
+        let [from, to] = self.span_s;
+        let seen = |[t, _]: &&[f64; 2]| (from..=to).contains(t);
+        for [t, x] in line.points.iter().step_by(every).filter(seen) {
             match (x.is_finite(), pieces.last_mut()) {
                 (true, Some(piece)) => {
                     let y = 100.0 * (high - x) / (high - low);
@@ -346,6 +349,16 @@ mod tests {
         assert_eq!(html.matches("<polyline").count(), 2);
         let empty = Traces { label: "h".into(), lines: Vec::new() };
         assert!(!TimeLine { traces: vec![empty], ..time_line() }.html().contains("polyline"));
+    }
+
+    #[test]
+    fn a_large_constant_has_a_range_and_points_before_the_axis_are_left_out() {
+        let points = [[-5.0, 0.0], [0.0, 1e20], [60.0, 1e20]].to_vec();
+        let line = TraceLine { label: "h".into(), style: Style::Actual, points };
+        let traces = vec![Traces { label: "h".into(), lines: vec![line] }];
+        let html = TimeLine { traces, ..time_line() }.html();
+        assert!(html.contains("points=\"0.0,50.0 1000.0,50.0\""), "{html}");
+        assert!(html.matches("class=\"level\"").count() < 10, "{html}");
     }
 
     #[test]

@@ -148,8 +148,9 @@ fn are_sides(a: &str, b: &str) -> bool {
     swapped || (a.len() == b.len() && differ.len() == 1 && letters)
 }
 
-/// The positions that a command moves most, all by the same amount, in rad; if there are none in rad, the normalised ones. A command
-/// may move two surfaces, of a V-tail for instance, of which another command moves one the other way: their mean is its own.
+/// The positions that a command moves most, all by the same amount, in rad; if there are none in rad, the normalised
+/// ones. There may be two: on a V-tail, the elevator moves both surfaces the same way and the rudder moves them
+/// opposite ways. The mean of both positions, with their signs, is then the position of the control.
 fn positions(tried: &Tried) -> Vec<&(String, [f64; 2])> {
     let kind = |name: &str| match name {
         _ if name.contains("deg") => 0,

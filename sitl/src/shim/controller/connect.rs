@@ -185,3 +185,31 @@ impl FlightController {
         true
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::{PlantOptions, Start};
+    use crate::shim::ShimOptions;
+    use crate::shim::codec::{Encoder, Parser, TimeSync};
+
+    /// The microseconds of a late clock fit into 64 bits, its nanoseconds do not.
+    #[test]
+    fn a_clock_of_three_hundred_years_answers_a_time_request() {
+        let options = ShimOptions {
+            clock_start_s: 1e10,
+            ..ShimOptions::new(PlantOptions::default(), Start::NEUTRAL)
+        };
+        let mut controller = FlightController::new(Personality::Px4, &options).unwrap();
+        let (mut request, mut out) = (Vec::new(), Vec::new());
+        Encoder::new(255, 190).encode(&TimeSync { ts1: 7, ..TimeSync::default() }, &mut request);
+        controller.show(&mut out);
+        controller.receive(&request);
+        out.clear();
+        controller.show(&mut out);
+        let mut answer: Option<TimeSync> = None;
+        Parser::default()
+            .datagram(&out, &mut |frame| answer = answer.or(frame.decode::<TimeSync>()));
+        assert_eq!(answer.map(|m| (m.tc1, m.ts1)), Some((i64::MAX, 7)));
+    }
+}

@@ -4,6 +4,9 @@ use std::collections::VecDeque;
 
 use crate::plant::{DT_S, Inputs, Truth};
 
+/// Longest delay of the surfaces, in steps: one minute. A ground station may set any delay.
+const LONGEST: usize = 6000;
+
 /// States of the gyro filter and of the command delay.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lag {
@@ -26,7 +29,8 @@ impl Lag {
 
     /// The inputs of `delay_ms`, ms, ago; the delay is rounded to whole steps. Before that, the first inputs.
     pub(super) fn delayed(&mut self, inputs: Inputs, delay_ms: f64) -> Inputs {
-        let steps = (delay_ms * 1e-3 / DT_S).round().max(0.0) as usize;
+        // NaN, for a stack without this parameter, becomes 0
+        let steps = ((delay_ms * 1e-3 / DT_S).round().max(0.0) as usize).min(LONGEST);
         self.late.push_back(inputs);
         while self.late.len() > steps + 1 {
             self.late.pop_front();
@@ -65,5 +69,14 @@ mod tests {
         let at = |i: usize| Inputs { elevator: i as f64, ..Inputs::default() };
         let flown: Vec<f64> = (0..8).map(|i| lag.delayed(at(i), 30.0).elevator).collect();
         assert_eq!(flown, [0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 4.0]);
+    }
+
+    #[test]
+    fn a_delay_of_any_length_holds_the_first_inputs() {
+        let mut lag = Lag::default();
+        let at = |elevator| Inputs { elevator, ..Inputs::default() };
+        let flown = [0.25, 0.5].map(|x| lag.delayed(at(x), 1e300).elevator);
+        assert_eq!(flown, [0.25, 0.25]);
+        assert_eq!(Lag::default().delayed(at(0.5), f64::NAN).elevator, 0.5);
     }
 }

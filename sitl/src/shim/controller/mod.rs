@@ -360,7 +360,7 @@ impl FlightController {
         } else if self.mission(frame) {
             // Answered.
         } else if let Some(m) = frame.decode::<TimeSync>().filter(|m| m.tc1 == 0) {
-            let tc1 = self.now_us as i64 * 1000;
+            let tc1 = (self.now_us as i64).saturating_mul(1000);
             self.encoder.encode(&TimeSync { tc1, ..m }, &mut self.waiting);
         }
     }

@@ -5,6 +5,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::FlightController;
+use crate::shim::codec::Parser;
 use crate::shim::error::ShimError;
 use crate::shim::flight::Over;
 use crate::shim::link::{Arrival, Link};
@@ -96,7 +97,12 @@ fn converse_until(link: &mut Link, controller: &mut FlightController, deadline: 
                 Arrival::Nothing => break,
                 Arrival::Datagram(bytes, from) => {
                     controller.receive(bytes);
-                    link.adopt(from);
+                    // a datagram without a frame, as from a port scan, must not take the link
+                    let mut heard = false;
+                    Parser::default().datagram(bytes, &mut |_| heard = true);
+                    if heard {
+                        link.adopt(from);
+                    }
                 }
                 Arrival::Bytes(bytes) => controller.receive(bytes),
                 Arrival::Connected(_) | Arrival::Closed => controller.restart_stream(),

@@ -18,6 +18,8 @@ pub(super) struct Sticks {
 
 /// Gap that ends a stream of MANUAL_CONTROL, µs: PX4's default of COM_RC_LOSS_T.
 const GAP_US: u64 = 500_000;
+/// Pulse width in RC_CHANNELS_OVERRIDE that leaves a channel unchanged.
+const UNCHANGED: u16 = u16::MAX;
 
 impl Sticks {
     pub(super) fn manual(&mut self, now_us: u64, m: &ManualControl) {
@@ -31,11 +33,18 @@ impl Sticks {
         self.since.map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
     }
 
-    /// Stores an override. The value 0 in one of the first three channels releases all three to the radio.
+    /// Stores an override. The value 0 in one of the first three channels releases all three to the radio. The value
+    /// 65535 leaves a channel unchanged.
     pub(super) fn override_channels(&mut self, now_us: u64, m: &RcChannelsOverride) {
         let [one, two, three, ..] = m.channel;
-        let given_back = [one, two, three].contains(&0);
-        self.channels = (!given_back).then_some((now_us, [one, two, three]));
+        let sent = [one, two, three];
+        if sent == [UNCHANGED; 3] {
+            return;
+        }
+        let before = self.channels.map_or(super::RADIO_US, |(_, pulses)| pulses);
+        let pulses =
+            std::array::from_fn(|i| if sent[i] == UNCHANGED { before[i] } else { sent[i] });
+        self.channels = (!sent.contains(&0)).then_some((now_us, pulses));
         self.overridden = self.channels.map(|(at, _)| at).or(self.overridden);
     }
 
@@ -92,12 +101,16 @@ pub(super) fn ardupilot(pulses: [u16; 3], parameters: &Table) -> Inputs {
         let pulse = f64::from(pulses[channel - 1]);
         let trim = read(channel, "TRIM");
         let end = if pulse > trim { read(channel, "MAX") } else { read(channel, "MIN") };
-        let share = (pulse - trim) / (end - trim).abs();
+        // a channel without travel stays neutral, as in ArduPilot
+        let share = if end == trim { 0.0 } else { (pulse - trim) / (end - trim).abs() };
         let sign = if read(channel, "REVERSED") == 1.0 { -1.0 } else { 1.0 };
         (4500.0 * sign * share.clamp(-1.0, 1.0)).trunc() / 4500.0
     };
     let (low, high) = (read(3, "MIN"), read(3, "MAX"));
-    let throttle = ((f64::from(pulses[2]) - low) / (high - low)).clamp(0.0, 1.0);
+    let throttle = match high > low {
+        true => ((f64::from(pulses[2]) - low) / (high - low)).clamp(0.0, 1.0),
+        false => 0.0,
+    };
     let throttle = (100.0 * throttle).trunc() / 100.0;
     // ArduPilot's pitch input is positive nose up.
     let sign = |name: &str| if parameters.get(name) == 1.0 { -1.0 } else { 1.0 };
@@ -108,4 +121,37 @@ pub(super) fn ardupilot(pulses: [u16; 3], parameters: &Table) -> Inputs {
         rudder: 0.0,
     }
     .clamped()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn overridden(all: &[[u16; 3]], changed: &[(&str, f64)]) -> Inputs {
+        let changed: Vec<_> = changed.iter().map(|(name, x)| ((*name).to_owned(), *x)).collect();
+        let parameters = Table::new(Personality::Ardupilot, &changed).unwrap();
+        let mut sticks = Sticks::default();
+        for pulses in all {
+            let mut message = RcChannelsOverride::default();
+            message.channel[..3].copy_from_slice(pulses);
+            sticks.override_channels(0, &message);
+        }
+        sticks.inputs(Personality::Ardupilot, &parameters, Inputs::default())
+    }
+
+    #[test]
+    fn a_channel_that_is_left_unchanged_keeps_its_pulse() {
+        let full = overridden(&[[2000, 1507, 1500], [u16::MAX, 1507, u16::MAX]], &[]);
+        assert_eq!((full.aileron, full.throttle), (1.0, 0.5));
+        let first = overridden(&[[u16::MAX, 1507, 1500]], &[]);
+        assert!(first.aileron.abs() < 0.02, "{first:?}");
+        assert_eq!(overridden(&[[u16::MAX; 3]], &[]), Inputs::default());
+    }
+
+    #[test]
+    fn a_channel_without_travel_is_neutral() {
+        let changed = [("RC1_MIN", 1494.0), ("RC3_MAX", 1000.0)];
+        let inputs = overridden(&[[1494, 1507, 1000]], &changed);
+        assert_eq!((inputs.aileron, inputs.throttle), (0.0, 0.0));
+    }
 }

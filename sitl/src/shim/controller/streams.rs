@@ -7,6 +7,9 @@ use crate::shim::telemetry::{self, FRAME_US, StateFrame};
 /// Sea-level density of the standard atmosphere, kg/m³.
 const SEA_LEVEL: f64 = 1.225;
 
+/// Longest period of a stream, µs: the largest that MESSAGE_INTERVAL can report.
+const LONGEST_US: f64 = i32::MAX as f64;
+
 /// Command result MAV_RESULT_DENIED.
 pub(super) const DENIED: u8 = 2;
 
@@ -65,7 +68,7 @@ impl Streams {
             return DENIED;
         }
         row.interval_us = match interval_us {
-            us if us > 0.0 => Some(f64::from(us).max(FRAME_US as f64) as u64),
+            us if us > 0.0 => Some(f64::from(us).clamp(FRAME_US as f64, LONGEST_US) as u64),
             _ => None,
         };
         0
@@ -167,4 +170,27 @@ fn servos(now: u64, measured: &Truth, travel: Travel) -> ServoOutputRaw {
     servo[1] = surface(measured.elevator_rad, travel.elevator.largest_rad());
     servo[2] = (1000.0 + 1000.0 * measured.throttle).round() as u16;
     ServoOutputRaw { time_usec: now as u32, servo, ..ServoOutputRaw::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_period_without_end_is_limited_to_what_can_be_reported() {
+        let mut streams = Streams::new(Equipment { travel: Travel::X8, receiver: 0 });
+        let (mut encoder, mut out) = (Encoder::new(1, 1), Vec::new());
+        let mut send = |streams: &mut Streams, time_us: u64| {
+            let truth =
+                Truth { static_pressure_pa: 1e5, air_density_kgpm3: 1.2, ..Truth::default() };
+            let frame = StateFrame::new(time_us, &truth, Travel::X8);
+            out.clear();
+            streams.send(&frame, &truth, 0.0, &mut encoder, &mut out);
+            out.len()
+        };
+        assert!(send(&mut streams, 10_000_000) > 0);
+        assert_eq!(streams.set(74, f32::INFINITY, f64::INFINITY), 0);
+        assert_eq!(streams.interval_us(74), i32::MAX);
+        assert!(send(&mut streams, 20_000_000) > 0);
+    }
 }

@@ -152,7 +152,8 @@ impl Client {
         let known = command.command == SET_MESSAGE_INTERVAL
             && command.param[0] == HilStateQuaternion::ID as f32;
         if known {
-            self.state_interval_us = (interval_us > 0.0).then_some(interval_us as u64);
+            let longest = f64::from(i32::MAX);
+            self.state_interval_us = (interval_us > 0.0).then_some(interval_us.min(longest) as u64);
         }
         CommandAck {
             command: command.command,
@@ -171,5 +172,27 @@ impl Client {
         };
         self.next_state_us = (self.next_state_us + interval).max(now_us + 1);
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_state_that_is_asked_for_once_in_forever_is_sent_once() {
+        let ask = |interval_us: f32| {
+            let mut param = [0.0; 7];
+            (param[0], param[1]) = (HilStateQuaternion::ID as f32, interval_us);
+            CommandLong { param, command: SET_MESSAGE_INTERVAL, ..CommandLong::default() }
+        };
+        let (mut bytes, mut frames) = (Vec::new(), Vec::new());
+        Encoder::new(1, 1).encode(&ask(f32::INFINITY), &mut bytes);
+        Parser::default().datagram(&bytes, &mut |frame| frames.push(frame));
+        let mut client = Client::new(0);
+        client.obey(&frames[0], &ask(4_000.0));
+        assert!(client.wants_state(1_000_000_000) && client.wants_state(1_000_004_000));
+        assert_eq!(client.obey(&frames[0], &ask(f32::INFINITY)).result, 0);
+        assert!(client.wants_state(1_000_008_000) && !client.wants_state(1_000_012_000));
     }
 }
