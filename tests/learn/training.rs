@@ -245,6 +245,8 @@ fn what_cannot_be_trained_is_said_by_name() {
     let short = [Track { states: tracks[0].states[..5].to_vec(), ..tracks[0].clone() }];
     assert!(said(recipe(10), &prior, &short).contains("samples"));
     assert!(said(names("roll_linear.Clda"), &prior, &short).contains("samples"));
+    let wide = Recipe { hidden: vec![200], ..recipe(10) };
+    assert!(said(wide, &prior, &tracks).contains("up to 128 units"));
     let mut low = prior.clone();
     low.join("ground_effect", &[0.1, 0.1, 600.0]).unwrap();
     assert!(said(recipe(10), &low, &tracks).contains("ground_effect"));

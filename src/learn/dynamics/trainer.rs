@@ -76,6 +76,8 @@ impl Trainer {
         let sizes: Vec<usize> =
             [INPUTS].into_iter().chain(recipe.hidden.iter().copied()).chain([OUTPUTS]).collect();
         let network = Dense::silent(&sizes, &mut stream::stream(recipe.seed, &[START]))?;
+        // layers that no residual may have must be rejected here, not when the trained model is made
+        Residual::new(network.clone(), &prior.airframe, prior.scale())?;
         let mut subject = Subject {
             scales: Scales::new(&prior.airframe, prior.scale()),
             prior: prior.clone(),
