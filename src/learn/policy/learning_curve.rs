@@ -6,6 +6,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::checkpoint::write_whole;
 use greylag_num::statistics::{interquartile_mean, quantile};
 
 /// File name of a curve.
@@ -59,11 +60,15 @@ impl CurvePoint {
         )
     }
 
-    /// Sum of both errors, degrees, or the negative reward if there is no evaluation. The best point has the smallest
-    /// value.
+    /// Sum of both errors, degrees, or the negative reward if there is no evaluation. Infinite without either. The best
+    /// point has the smallest value.
     pub fn badness(&self) -> f64 {
         let error = self.easy_deg + self.hard_deg;
-        if error.is_nan() { -self.reward } else { error }
+        match (error.is_nan(), self.reward.is_nan()) {
+            (false, _) => error,
+            (true, false) => -self.reward,
+            (true, true) => f64::INFINITY,
+        }
     }
 }
 
@@ -153,8 +158,8 @@ pub struct CurveFile {
 }
 
 impl CurveFile {
-    /// Opens the curve in `path` to continue it after `steps`. Later points are removed. A new curve is started if
-    /// there is no file.
+    /// Opens the curve in `path` to continue it after `steps`. Later points are removed, by an atomic replacement of the
+    /// file. A new curve is started if there is no file.
     ///
     /// # Errors
     ///
@@ -165,12 +170,9 @@ impl CurveFile {
             points => points.map_err(std::io::Error::other)?,
         };
         points.retain(|p| p.steps <= steps);
-        let mut file = File::create(path)?;
-        writeln!(file, "{COLUMNS}")?;
-        for point in &points {
-            writeln!(file, "{}", point.line())?;
-        }
-        Ok(CurveFile { file, points })
+        let lines: String = points.iter().map(|point| point.line() + "\n").collect();
+        write_whole(path, format!("{COLUMNS}\n{lines}").as_bytes())?;
+        Ok(CurveFile { file: File::options().append(true).open(path)?, points })
     }
 
     /// Points of the curve.
@@ -247,6 +249,31 @@ mod tests {
         // A file that was made and not yet written is an empty curve.
         std::fs::write(&path, "").unwrap();
         assert!(CurveFile::open(&path, 10).unwrap().points().is_empty());
+    }
+
+    /// A program that ends while the curve is shortened leaves the old file or the new one.
+    #[test]
+    fn a_curve_is_shortened_in_a_new_file() {
+        use std::io::Read as _;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(CURVE);
+        let mut file = CurveFile::open(&path, 0).unwrap();
+        [10, 20, 30].into_iter().for_each(|steps| file.add(point(steps, 1.0)).unwrap());
+        let mut before = File::open(&path).unwrap();
+        let mut again = CurveFile::open(&path, 20).unwrap();
+        again.add(point(25, 1.0)).unwrap();
+        let mut text = String::new();
+        before.read_to_string(&mut text).unwrap();
+        assert_eq!(text.lines().count(), 4, "{text}");
+        assert_eq!(read(&path).unwrap().last().map(|p| p.steps), Some(25));
+    }
+
+    #[test]
+    fn a_point_without_error_and_reward_is_not_the_best() {
+        let nothing = CurvePoint { easy_deg: f64::NAN, reward: f64::NAN, ..point(2, 0.0) };
+        assert_eq!(best(&[point(1, 3.0), nothing]), Some(0));
+        assert_eq!(CurvePoint { reward: -0.2, ..nothing }.badness(), 0.2);
+        assert_eq!(nothing.badness(), f64::INFINITY);
     }
 
     #[test]
