@@ -264,13 +264,19 @@ impl Measures {
     }
 }
 
+/// Names of the moments of inertia in a model file.
+const MOMENTS: [&str; 3] = ["jx_kgm2", "jy_kgm2", "jz_kgm2"];
+
 /// Appends estimates as lines of a model file. A standard deviation of zero is omitted.
 pub fn numbers(out: &mut String, estimates: &[Estimate]) {
     for (name, value, width, source) in estimates {
-        let _ = write!(out, "{name} = {{ value = {value:.5}, source = \"{source}\"");
+        // five decimals are too few for the moments of inertia of an aircraft of a few grams
+        let tiny = MOMENTS.contains(name) && 0.0 < *value && *value < 1e-5;
+        let number = if tiny { format!("{value:.4e}") } else { format!("{value:.5}") };
+        let _ = write!(out, "{name} = {{ value = {number}, source = \"{source}\"");
         let sd = width * value.abs();
         // a value that is written as zero is fixed in a fit
-        if sd > 0.0 && value.abs() >= 5e-6 {
+        if sd > 0.0 && (tiny || value.abs() >= 5e-6) {
             let _ = write!(out, ", sd = {sd:.3e}");
         }
         out.push_str(" }\n");
@@ -337,6 +343,21 @@ mod tests {
     fn both_kinds_of_tail_make_files_that_load() {
         assert!(made(Tail::Conventional, Some(0.4)).has_rudder());
         assert!(!made(Tail::FlyingWing, None).has_rudder());
+    }
+
+    #[test]
+    fn the_files_of_an_aircraft_of_ten_grams_load() {
+        let tiny = Measures {
+            mass: 0.01,
+            span: 0.15,
+            area: 0.0045,
+            static_thrust: 0.05,
+            pitch_speed: 15.0,
+            ..measures(Tail::Conventional, Some(0.4))
+        };
+        let model = GreyBox::from_texts(&tiny.model(), &tiny.airframe()).unwrap();
+        let [(_, jx, ..), ..] = tiny.inertia();
+        assert!(jx < 1e-5 && (model.body.jx / jx - 1.0).abs() < 1e-3, "{:?} {jx}", model.body);
     }
 
     #[test]
