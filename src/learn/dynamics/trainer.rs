@@ -153,7 +153,13 @@ impl Trainer {
             self.prior.axes
         );
         let airframe = fingerprint(&self.prior.airframe);
-        hash(format!("{recipe} {prior} {airframe} {}", self.data).as_bytes())
+        // a prior without tables and effect files keeps its former identity
+        let tables: String =
+            self.prior.tables().map(|(id, table)| format!(" {id} {table:?}")).collect();
+        let grid = self.prior.thrust_grid().map(|grid| format!(" {grid:?}")).unwrap_or_default();
+        let written: String = self.prior.written().map(|own| format!(" {}", own.text)).collect();
+        let data = &self.data;
+        hash(format!("{recipe} {prior} {airframe} {data}{tables}{grid}{written}").as_bytes())
     }
 
     /// Number of updates made.
