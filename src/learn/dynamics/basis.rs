@@ -34,7 +34,7 @@ pub struct Basis {
     pub places: Vec<usize>,
     /// Initial coefficients θ_p0.
     start: DVector<f64>,
-    /// Physically possible ranges; `None` without bounds.
+    /// Bounds that the model states, or else the physical ones; `None` without bounds.
     bounds: Vec<Option<(f64, f64)>>,
     /// Prior information 1/σ² on θ_p0; zero if the model's file states no σ.
     information: DVector<f64>,
@@ -192,7 +192,7 @@ impl Basis {
         self.turn.transpose() * weighed
     }
 
-    /// Sets the coefficients of `model` from `coordinates`, clamped to their possible ranges.
+    /// Sets the coefficients of `model` from `coordinates`, clamped to their bounds.
     pub fn apply(&self, model: &mut GreyBox, coordinates: &[f64]) {
         let theta = &self.start + &self.turn * DVector::from_column_slice(coordinates);
         let mut values: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
