@@ -145,12 +145,16 @@ impl Measures {
         let f = self.figures();
         let Drives { frequency, damping, lag, source } = *drives;
         let mut out = format!(
-            "# Written by `greylag aircraft`: measure what is marked as an estimate.\nschema = 2\nname = {:?}\n\n\
+            "# Written by `greylag aircraft`: measure what is marked as an estimate.\nschema = 2\nname = {}\n\n\
              [geometry]\nwing_area_m2 = {{ value = {:?}, source = \"given\" }}\nspan_m = {{ value = {:?}, source = \
              \"given\" }}\nmean_chord_m = {{ value = {:.5}, source = \"area over span\" }}\n\n[reference]\n\
              airspeed_mps = {{ value = {:.2}, source = \"cruise\" }}\naltitude_m = {{ value = 100.0, source = \
              \"estimate\" }}\n\n",
-            self.name, self.area, self.span, chord, f.cruise
+            quoted(&self.name),
+            self.area,
+            self.span,
+            chord,
+            f.cruise
         );
         let surfaces = [
             ("aileron", Some(self.travel)),
@@ -201,10 +205,10 @@ impl Measures {
         description: &str,
     ) -> String {
         let mut out = format!(
-            "# Written by `greylag aircraft`: fly, then `greylag amend --tune-only`.\nschema = 1\nname = {:?}\n\
+            "# Written by `greylag aircraft`: fly, then `greylag amend --tune-only`.\nschema = 1\nname = {}\n\
              description = {description:?}\nairframe = \"airframe.toml\"\n\
              integrator = \"rk4\"\nforce_axes = \"wind\"\n\n[rigid_body]\n",
-            format!("{}-prior", self.name)
+            quoted(&format!("{}-prior", self.name))
         );
         let given: [Estimate; 1] = [("mass_kg", self.mass, 0.01, "given")];
         numbers(&mut out, &given);
@@ -262,6 +266,11 @@ impl Measures {
             ("jxz_kgm2", 0.0, 0.0, "estimate: axes are principal ones"),
         ]
     }
+}
+
+/// The text as a TOML string. TOML lacks some of Rust's escape sequences.
+fn quoted(text: &str) -> String {
+    toml::Value::from(text).to_string()
 }
 
 /// Names of the moments of inertia in a model file.
@@ -343,6 +352,16 @@ mod tests {
     fn both_kinds_of_tail_make_files_that_load() {
         assert!(made(Tail::Conventional, Some(0.4)).has_rudder());
         assert!(!made(Tail::FlyingWing, None).has_rudder());
+    }
+
+    /// A combining accent and a quotation mark, as a folder's name may have them.
+    #[test]
+    fn any_name_stands_in_the_files() {
+        let name = "Pe\u{301}lican \"2\"";
+        let own = Measures { name: name.into(), ..measures(Tail::FlyingWing, None) };
+        let model = GreyBox::from_texts(&own.model(), &own.airframe()).unwrap();
+        assert_eq!(model.airframe.name, name);
+        assert_eq!(model.name, format!("{name}-prior"));
     }
 
     #[test]
