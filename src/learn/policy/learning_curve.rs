@@ -132,7 +132,8 @@ pub fn spread(
     for &x in at {
         let value = |points: &&[CurvePoint]| {
             let after = points.partition_point(|p| over(p) < x);
-            let (Some(b), a) = (points.get(after), &points[after.saturating_sub(1)]) else {
+            let (Some(b), Some(a)) = (points.get(after), points.get(after.saturating_sub(1)))
+            else {
                 return f64::NAN;
             };
             match (over(b) == x, after) {
@@ -295,5 +296,8 @@ mod tests {
         assert_eq!(spread.middle[..3], [6.0, 4.5, 3.0]);
         assert_eq!((spread.low[1], spread.high[1]), (3.0, 6.0));
         assert!(spread.middle[3].is_nan());
+        // a curve before its first point
+        let empty = super::spread(&[&[]], |p| p.seconds, |p| p.easy_deg, &[0.0]);
+        assert!(empty.middle[0].is_nan());
     }
 }
