@@ -194,7 +194,7 @@ fn entry<'a>(effects: &'a mut dyn TableLike, name: &str) -> Result<&'a mut Item,
 }
 
 /// The table of an effect whose file gives the value of the coefficient `name`, the coefficient's short name, and the
-/// source of the effect. `None` if the model file has the coefficient itself or the effect's file does not know it.
+/// source of the effect. `None` if the model file has the coefficient itself or the effect's file does not define it.
 fn left_to_effect_file<'a, 'b>(
     effects: &'a mut dyn TableLike,
     name: &'b str,

@@ -109,8 +109,8 @@ fn fail(doing: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Expo
     move |why| ExportError::File { doing, path, why }
 }
 
-/// Name and content of each effect file of the model file `table` in the folder `beside`. A folder of effect files
-/// stands for its `.toml` files, as when the model is read. Files of the same name are renamed.
+/// Name and content of each effect file of the model file `table` in the folder `beside`. A folder
+/// contributes its `.toml` files, as when the model is read. Files of the same name are renamed.
 fn effect_files(table: &toml::Table, beside: &Path) -> Result<Vec<(String, Vec<u8>)>, ExportError> {
     let mut own: Vec<(String, Vec<u8>)> = Vec::new();
     for effect in table.get("effect_files").and_then(|e| e.as_array()).into_iter().flatten() {
