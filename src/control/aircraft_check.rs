@@ -5,7 +5,7 @@ use serde::Serialize;
 
 pub use crate::authority::Authority;
 use crate::lqi::{self, LoopMargins, MarginsError, Weights};
-use crate::{ControllerKind, build};
+use crate::{ControllerKind, SetupError, build};
 use greylag_model::modes::{Mode, modes};
 use greylag_model::{GreyBox, Trim, TrimError};
 
@@ -192,7 +192,9 @@ fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String
         ));
     }
     if let Err(why) = build(ControllerKind::Lqi, model) {
-        out.push(format!("{why}; give the envelope less bank or a pitch_min_deg nearer to 0"));
+        let remedy = "; give the envelope less bank or a pitch_min_deg nearer to 0";
+        let by_envelope = matches!(why, SetupError::Design { .. });
+        out.push(format!("{why}{}", if by_envelope { remedy } else { "" }));
     }
     let Advised { name, delay_s } = check.controller;
     if delay_s < USUAL_DELAY {

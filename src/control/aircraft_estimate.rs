@@ -4,7 +4,7 @@
 //! recursive least squares with a prior: ω̇ is a sum of terms, each a coefficient times a measured quantity. Both sides are
 //! differentiated and pass the same low-pass filters. The differentiation removes constant and slow influences (trim, wind).
 //!
-//! The estimator needs no model, and no command depends on it. It shows what a flight has revealed of an unknown aircraft.
+//! The estimator needs no model, and no command depends on it. Its estimates are for display and for the flight's summary.
 
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{ActuatorState, Airframe, State, Time};
@@ -196,8 +196,8 @@ impl AircraftEstimator {
     }
 
     /// The dimensional derivatives at the cruise airspeed, in the order of [`DERIVATIVES`]: L_δa and M_δe in rad/s² at full
-    /// deflection (L_δa is positive, M_δe negative), L_p and M_q in 1/s, M_α in 1/s². NaN if the flight has not revealed the
-    /// value: its standard deviation is above 0.3 of the prior's.
+    /// deflection (L_δa is positive, M_δe negative), L_p and M_q in 1/s, M_α in 1/s². NaN if the standard deviation of the
+    /// estimate is above 0.3 of the prior's.
     pub fn derivatives(&self) -> [f64; DERIVATIVES.len()] {
         let time = self.cruise / STANDARD_GRAVITY;
         let [roll, pitch] = &self.axes;
@@ -215,7 +215,7 @@ impl AircraftEstimator {
 mod tests {
     use super::*;
 
-    /// The axis is asked for a power of 120, a damping of 12 and a trim moment that it was not told.
+    /// The true control power is 120, the true damping 12. The constant moment is not among the regressors.
     #[test]
     fn control_power_and_damping_are_found_without_bias() {
         let (time, step, truth) = (2.0, 0.01, [120.0, 12.0]);

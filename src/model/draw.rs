@@ -5,22 +5,28 @@ use rand_distr::{Distribution, StandardNormal};
 use crate::{GreyBox, Named};
 use greylag_num::stream;
 use greylag_physics::effects::Kind;
+use greylag_physics::inputs;
 
 /// Number of the random stream for draws.
 const DRAWS: u64 = 40;
 
 impl GreyBox {
-    /// Physical bounds of the coefficient `name` (`effect.coefficient`), for an aircraft of this size. `None` if there is no
-    /// such coefficient.
+    /// Bounds of the coefficient `name` (`effect.coefficient`): those that the model states, else the physical ones for an
+    /// aircraft of this size. `None` if there is no such coefficient.
     pub fn bounds_of(&self, name: &str) -> Option<(f64, f64)> {
+        let stated = self.coefficients().iter().find(|c| c.name == name).and_then(|c| c.bounds);
+        if let Some([least, most]) = stated {
+            return Some((least, most));
+        }
         let (effect, coefficient) = name.split_once('.')?;
-        let about = Kind::from_id(effect)?.describe();
+        let input = || inputs::Kind::from_id(effect).map(|kind| kind.describe());
+        let about = Kind::from_id(effect).map(|kind| kind.describe()).or_else(input)?;
         let found = about.coefficients.iter().find(|c| c.name == coefficient)?;
         Some(self.size().bounds(found))
     }
 
     /// Draw number `k` of `seed`. Every coefficient is normally distributed about its value, with its [width](Named::width) as
-    /// standard deviation, and limited to its physical bounds. Mass, inertia, actuators and the residual are unchanged.
+    /// standard deviation, and limited to its [bounds](GreyBox::bounds_of). Mass, inertia, actuators and the residual are unchanged.
     pub fn drawn(&self, seed: u64, k: u64) -> GreyBox {
         let mut rng = stream::stream(seed, &[DRAWS, k]);
         let draw = |c: &Named| {
@@ -55,5 +61,24 @@ mod tests {
         }
         assert_eq!(model.drawn(7, 3).coefficients(), draws[3].coefficients());
         assert_ne!(model.drawn(8, 3).coefficients(), draws[3].coefficients());
+    }
+
+    #[test]
+    fn draws_keep_to_stated_bounds_and_to_those_of_input_effects() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/prior.toml");
+        let mut model = GreyBox::load(&path).unwrap();
+        let name = "drag_linear.CD0";
+        let (_, most) = model.bounds_of(name).unwrap();
+        assert!(model.set_bounds(name, [most + 1.0, most + 3.0]));
+        assert!(model.set_coefficient(name, most + 2.0));
+        model.join("time_delay", &[0.05]).unwrap();
+        let model = model.with_widths(|c| (c.name == "time_delay.delay_s").then_some(1.0));
+        for k in 0..50 {
+            let drawn = model.drawn(7, k);
+            let of =
+                |name: &str| drawn.coefficients().iter().find(|c| c.name == name).unwrap().value;
+            assert!((most + 1.0..=most + 3.0).contains(&of(name)), "{}", of(name));
+            assert!(of("time_delay.delay_s") >= 0.0);
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Edits of a model file's text: new values and effects, with all other text unchanged.
 
 use crate::known::{FlightConstants, Known, SENSORS, TRIMS};
+use greylag_physics::effects::Kind;
 use toml_edit::{DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
 /// Reason why the text of a model file cannot be edited.
@@ -111,6 +112,16 @@ impl Edit {
 
     fn change(&self, effects: &mut dyn TableLike, number: &Number) -> Result<(), EditError> {
         let place = || EditError::Place(format!("effects.{}", number.name));
+        if let Some((table, short, own)) = left_to_effect_file(effects, &number.name)? {
+            let source = format!("{}; fitted to {}", original(own), self.fitted_to);
+            let mut entry = sourced(number, &source);
+            if let Some(bounds) = number.bounds {
+                let both: toml_edit::Array = bounds.into_iter().collect();
+                entry.insert("bounds", both.into());
+            }
+            table.insert(short, Item::Value(Value::InlineTable(entry)));
+            return Ok(());
+        }
         let item = entry(effects, &number.name)?;
         let table = item.as_table_like_mut().ok_or_else(place)?;
         let old = table.get("source").and_then(Item::as_str).unwrap_or("no source");
@@ -182,6 +193,20 @@ fn entry<'a>(effects: &'a mut dyn TableLike, name: &str) -> Result<&'a mut Item,
     item.ok_or_else(|| EditError::Place(format!("effects.{name}")))
 }
 
+/// The table of an effect whose file gives the value of the coefficient `name`, the coefficient's short name, and the
+/// source of the effect. `None` if the model file has the coefficient itself or the effect's file does not define it.
+fn left_to_effect_file<'a, 'b>(
+    effects: &'a mut dyn TableLike,
+    name: &'b str,
+) -> Result<Option<(&'a mut dyn TableLike, &'b str, &'static str)>, EditError> {
+    let (id, short) = split(name)?;
+    let written = Kind::from_id(id).and_then(Kind::written).map(|effect| effect.about);
+    let known = written.filter(|about| about.coefficients.iter().any(|c| c.name == short));
+    let table = effects.get_mut(id).and_then(Item::as_table_like_mut);
+    let table = table.filter(|table| !table.contains_key(short));
+    Ok(table.zip(known).map(|(table, about)| (table, short, about.source)))
+}
+
 /// Sets the coefficient `name` to zero because the effect `by` replaces its term.
 fn drop_coefficient(effects: &mut dyn TableLike, name: &str, by: &str) -> Result<(), EditError> {
     let place = || EditError::Place(format!("effects.{name}"));
@@ -193,6 +218,8 @@ fn drop_coefficient(effects: &mut dyn TableLike, name: &str, by: &str) -> Result
         replace(old, new);
     }
     table.remove("sd");
+    // bounds of the former value may exclude zero
+    table.remove("bounds");
     Ok(())
 }
 
@@ -292,6 +319,22 @@ CLq = { value = 3.87, sd = 0.1, source = "Gryte" } # damps
         let read: toml::Table = toml::from_str(&again.apply(&text).unwrap()).unwrap();
         let source = read["effects"]["lift_linear"]["CLalpha"]["source"].as_str();
         assert_eq!(source, Some("greylag amend: Gryte; fitted to b.csv"));
+    }
+
+    #[test]
+    fn a_dropped_coefficient_loses_its_bounds_and_one_of_an_effect_file_gets_an_entry() {
+        let text =
+            TEXT.replace("3.87, sd", "3.87, bounds = [2.0, 6.0], sd") + "[effects.p_factor]\n";
+        let number = Number { bounds: Some([0.1, 2.0]), ..number("p_factor.k", 0.4, Some(0.1)) };
+        let text = Edit { changed: vec![number], ..edit() }.apply(&text).unwrap();
+        let read: toml::Table = toml::from_str(&text).unwrap();
+        let dropped = &read["effects"]["lift_linear"]["CLq"];
+        assert_eq!(dropped["value"].as_float(), Some(0.0));
+        assert!(dropped.get("bounds").is_none(), "{text}");
+        let fitted = &read["effects"]["p_factor"]["k"];
+        assert_eq!(fitted["value"].as_float(), Some(0.4));
+        assert_eq!(fitted["bounds"][1].as_float(), Some(2.0));
+        assert!(fitted["source"].as_str().unwrap().ends_with("fitted to a.csv (sha256 01)"));
     }
 
     #[test]

@@ -112,7 +112,8 @@ fn document(conditions: &Conditions, name: &str, [motor, thruster]: [&str; 2]) -
         "<?xml version=\"1.0\"?>\n<!-- Written by `greylag aircraft export jsbsim` from the model {}. -->\n\
          <fdm_config name=\"{name}\" version=\"2.0\" release=\"BETA\">\n\n  <metrics>\n    <wingarea unit=\"M2\"> {:?} \
          </wingarea>\n    <wingspan unit=\"M\"> {:?} </wingspan>\n    <chord unit=\"M\"> {:?} </chord>\n",
-        conditions.names(),
+        // XML has no double hyphen in a comment
+        conditions.names().replace("--", "__"),
         geometry.area,
         geometry.span,
         geometry.chord

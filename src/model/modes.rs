@@ -108,6 +108,8 @@ fn longitudinal(all: &[Complex<f64>]) -> Vec<Mode> {
     let names: &[&'static str] = match all.len() {
         2 => &["short period", "phugoid"],
         3 if all[2].im > 0.0 => &["fast pitch", "slow pitch", "phugoid"],
+        // behind the neutral point, pitch and phugoid may join in one oscillation
+        3 if all[1].im > 0.0 => &["fast pitch", "third oscillation", "slow pitch"],
         3 => &["short period", "airspeed", "slow airspeed"],
         _ => &["fast pitch", "slow pitch", "airspeed", "slow airspeed"],
     };
@@ -135,6 +137,16 @@ fn named(all: &[Complex<f64>], names: &[&'static str]) -> Vec<Mode> {
 mod tests {
     use super::*;
     use std::path::Path;
+
+    #[test]
+    fn an_oscillation_between_two_aperiodic_modes_is_neither_short_period_nor_airspeed() {
+        let [fast, pair, slow] =
+            [(-8.0, 0.0), (-0.1, 0.5), (0.2, 0.0)].map(|(re, im)| Complex::new(re, im));
+        let modes = longitudinal(&[fast, pair, slow]);
+        let names: Vec<_> = modes.iter().map(|m| (m.name, m.oscillates())).collect();
+        let expected = [("fast pitch", false), ("third oscillation", true), ("slow pitch", false)];
+        assert_eq!(names, expected);
+    }
 
     #[test]
     fn an_aerosonde_has_the_modes_of_a_conventional_aircraft() {

@@ -145,12 +145,16 @@ impl Measures {
         let f = self.figures();
         let Drives { frequency, damping, lag, source } = *drives;
         let mut out = format!(
-            "# Written by `greylag aircraft`: measure what is marked as an estimate.\nschema = 2\nname = {:?}\n\n\
+            "# Written by `greylag aircraft`: measure what is marked as an estimate.\nschema = 2\nname = {}\n\n\
              [geometry]\nwing_area_m2 = {{ value = {:?}, source = \"given\" }}\nspan_m = {{ value = {:?}, source = \
              \"given\" }}\nmean_chord_m = {{ value = {:.5}, source = \"area over span\" }}\n\n[reference]\n\
              airspeed_mps = {{ value = {:.2}, source = \"cruise\" }}\naltitude_m = {{ value = 100.0, source = \
              \"estimate\" }}\n\n",
-            self.name, self.area, self.span, chord, f.cruise
+            quoted(&self.name),
+            self.area,
+            self.span,
+            chord,
+            f.cruise
         );
         let surfaces = [
             ("aileron", Some(self.travel)),
@@ -201,10 +205,10 @@ impl Measures {
         description: &str,
     ) -> String {
         let mut out = format!(
-            "# Written by `greylag aircraft`: fly, then `greylag amend --tune-only`.\nschema = 1\nname = {:?}\n\
+            "# Written by `greylag aircraft`: fly, then `greylag amend --tune-only`.\nschema = 1\nname = {}\n\
              description = {description:?}\nairframe = \"airframe.toml\"\n\
              integrator = \"rk4\"\nforce_axes = \"wind\"\n\n[rigid_body]\n",
-            format!("{}-prior", self.name)
+            quoted(&format!("{}-prior", self.name))
         );
         let given: [Estimate; 1] = [("mass_kg", self.mass, 0.01, "given")];
         numbers(&mut out, &given);
@@ -264,13 +268,24 @@ impl Measures {
     }
 }
 
+/// The text as a TOML string. TOML lacks some of Rust's escape sequences.
+fn quoted(text: &str) -> String {
+    toml::Value::from(text).to_string()
+}
+
+/// Names of the moments of inertia in a model file.
+const MOMENTS: [&str; 3] = ["jx_kgm2", "jy_kgm2", "jz_kgm2"];
+
 /// Appends estimates as lines of a model file. A standard deviation of zero is omitted.
 pub fn numbers(out: &mut String, estimates: &[Estimate]) {
     for (name, value, width, source) in estimates {
-        let _ = write!(out, "{name} = {{ value = {value:.5}, source = \"{source}\"");
+        // five decimals are too few for the moments of inertia of an aircraft of a few grams
+        let tiny = MOMENTS.contains(name) && 0.0 < *value && *value < 1e-5;
+        let number = if tiny { format!("{value:.4e}") } else { format!("{value:.5}") };
+        let _ = write!(out, "{name} = {{ value = {number}, source = \"{source}\"");
         let sd = width * value.abs();
         // a value that is written as zero is fixed in a fit
-        if sd > 0.0 && value.abs() >= 5e-6 {
+        if sd > 0.0 && (tiny || value.abs() >= 5e-6) {
             let _ = write!(out, ", sd = {sd:.3e}");
         }
         out.push_str(" }\n");
@@ -337,6 +352,31 @@ mod tests {
     fn both_kinds_of_tail_make_files_that_load() {
         assert!(made(Tail::Conventional, Some(0.4)).has_rudder());
         assert!(!made(Tail::FlyingWing, None).has_rudder());
+    }
+
+    /// A combining accent and a quotation mark, as a folder's name may have them.
+    #[test]
+    fn any_name_stands_in_the_files() {
+        let name = "Pe\u{301}lican \"2\"";
+        let own = Measures { name: name.into(), ..measures(Tail::FlyingWing, None) };
+        let model = GreyBox::from_texts(&own.model(), &own.airframe()).unwrap();
+        assert_eq!(model.airframe.name, name);
+        assert_eq!(model.name, format!("{name}-prior"));
+    }
+
+    #[test]
+    fn the_files_of_an_aircraft_of_ten_grams_load() {
+        let tiny = Measures {
+            mass: 0.01,
+            span: 0.15,
+            area: 0.0045,
+            static_thrust: 0.05,
+            pitch_speed: 15.0,
+            ..measures(Tail::Conventional, Some(0.4))
+        };
+        let model = GreyBox::from_texts(&tiny.model(), &tiny.airframe()).unwrap();
+        let [(_, jx, ..), ..] = tiny.inertia();
+        assert!(jx < 1e-5 && (model.body.jx / jx - 1.0).abs() < 1e-3, "{:?} {jx}", model.body);
     }
 
     #[test]

@@ -146,6 +146,16 @@ fn training(seed: u64) -> PolicyTrainer<Imagination> {
     PolicyTrainer::new(recipe, world, format!("seed {seed}")).unwrap()
 }
 
+/// An interval of evaluations that is as good as none must not overflow.
+#[test]
+fn a_run_of_any_length_stops_at_each_checkpoint() {
+    let mut trainer = training(3);
+    trainer.run(u64::MAX).unwrap();
+    assert_eq!(trainer.steps(), 600);
+    trainer.run(u64::MAX).unwrap();
+    assert_eq!(trainer.steps(), 1_200);
+}
+
 #[test]
 fn a_training_that_is_resumed_ends_as_one_that_was_not_interrupted() {
     let end = |trainer: &mut PolicyTrainer<Imagination>| {

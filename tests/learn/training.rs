@@ -233,6 +233,23 @@ fn an_interrupted_training_ends_the_same_to_the_bit() {
     assert!(Checkpoint::load(&path).is_err());
 }
 
+/// A table is no coefficient, but the residual has learned what it leaves over.
+#[test]
+fn a_checkpoint_of_a_prior_with_another_table_is_refused() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/jsbsim.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let prior = GreyBox::parse(&text, &path).unwrap();
+    let changed = text.replace("0.1308, 0.2146", "0.1308, 0.2147");
+    assert_ne!(changed, text);
+    let other = GreyBox::parse(&changed, &path).unwrap();
+    let trainer = |prior: &GreyBox| Trainer::new(recipe(10), prior, tracks(prior, prior)).unwrap();
+    let flights = tracks(&prior, &prior);
+    let mut same = Trainer::new(recipe(10), &prior, flights.clone()).unwrap();
+    same.resume(trainer(&prior).checkpoint()).unwrap();
+    let mut another = Trainer::new(recipe(10), &other, flights).unwrap();
+    assert!(another.resume(trainer(&prior).checkpoint()).is_err());
+}
+
 #[test]
 fn what_cannot_be_trained_is_said_by_name() {
     let (truth, prior) = (model("prior"), model("prior"));
@@ -244,6 +261,9 @@ fn what_cannot_be_trained_is_said_by_name() {
     assert!(said(names("roll_linear.Clwrong"), &prior, &tracks).contains("Clwrong"));
     let short = [Track { states: tracks[0].states[..5].to_vec(), ..tracks[0].clone() }];
     assert!(said(recipe(10), &prior, &short).contains("samples"));
+    assert!(said(names("roll_linear.Clda"), &prior, &short).contains("samples"));
+    let wide = Recipe { hidden: vec![200], ..recipe(10) };
+    assert!(said(wide, &prior, &tracks).contains("up to 128 units"));
     let mut low = prior.clone();
     low.join("ground_effect", &[0.1, 0.1, 600.0]).unwrap();
     assert!(said(recipe(10), &low, &tracks).contains("ground_effect"));

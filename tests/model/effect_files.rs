@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use greylag::control::aircraft_check::check;
 use greylag::control::{ControllerKind, SetupError, build};
 use greylag::model::{GreyBox, Trim, linearise};
 use greylag::physics::Channel;
@@ -68,6 +69,10 @@ fn what_a_search_proposed_does_not_fly() {
     let refused = build(ControllerKind::Lqi, &model).err().unwrap();
     assert!(matches!(&refused, SetupError::Proposed { effect, .. } if *effect == ID));
     assert!(refused.to_string().contains("status = \"accepted\""));
+    // the envelope is not the reason
+    let findings = check(&model).unwrap().findings;
+    let finding = findings.iter().find(|f| f.contains("status = \"accepted\"")).unwrap();
+    assert!(!finding.contains("less bank"), "{finding}");
     let accepted = folder_of(ID, "accepted");
     let model = GreyBox::load(&accepted.path().join("model.toml")).unwrap();
     assert!(build(ControllerKind::Lqi, &model).is_ok());

@@ -147,7 +147,8 @@ impl Adaptive {
                 reference[k] += rate * STEP;
             }
         }
-        self.reference = Some(reference);
+        // a reference that started at an unknown attitude starts again at the next tick
+        self.reference = Some(reference).filter(|x| x.iter().all(|x| x.is_finite()));
         [reference, rates]
     }
 
@@ -225,5 +226,30 @@ impl Controller for Adaptive {
         let skid = state.r - turn * cos * level;
         let rudder = (YAW_DAMPING * time * skid).clamp(-RUDDER_MOST, RUDDER_MOST);
         Command { aileron, elevator: -up, throttle, rudder: if self.rudder { rudder } else { 0.0 } }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use greylag_model::GreyBox;
+    use greylag_physics::{ActuatorState, State, Time};
+    use std::path::Path;
+
+    #[test]
+    fn an_attitude_that_is_unknown_at_first_does_not_stay_in_the_reference() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
+        let model = GreyBox::load(&path).unwrap();
+        let mut controller = Adaptive::new(&model.airframe);
+        let seen = |roll: f64| Observation {
+            time: Time::default(),
+            state: State { roll, ..State::NEUTRAL },
+            actuators: ActuatorState::default(),
+            altitude: 600.0,
+            previous: [Command::IDLE; 2],
+        };
+        let target = Target { roll: 0.5, pitch: 0.1, airspeed: 16.67 };
+        assert!(!controller.command(&seen(f64::NAN), &target).is_finite());
+        assert!(controller.command(&seen(0.1), &target).is_finite());
     }
 }

@@ -163,6 +163,8 @@ impl Cem {
         let all = self.blocks.len();
         let fitted = self.settings.value == Value::Fitted && self.settings.alpha.is_some();
         self.surrogate = None;
+        // a search that failed may have left its best candidates
+        self.kept.clear();
         let mut first = self.settings.proposals.div_ceil(WIDTH).min(all);
         self.sample_noise(&mut rng, [0, first]);
         self.fly(seen, target, Actions::Policy, [0, first]);
@@ -389,3 +391,6 @@ impl Controller for Cem {
         self.last.map_or(LOST, |plan| flown(&plan[self.age]))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -99,7 +99,7 @@ pub(super) enum Machine {
 type Wide = Lanes<32, true, Pair<std::arch::x86_64::__m512>>;
 
 impl Machine {
-    /// The instruction set that is asked for, or the widest below it that this processor supports.
+    /// The requested instruction set, or the widest narrower one that this processor supports.
     pub fn new(wanted: Instructions) -> Machine {
         match wanted {
             #[cfg(target_arch = "x86_64")]

@@ -23,7 +23,7 @@ use greylag_physics::airframe::Envelope;
 use greylag_physics::servos::Travel;
 use greylag_physics::{Command, Controls, State};
 
-/// Fraction of the limits of load factor and angle of attack at which the limiter aims. The rest covers model error.
+/// Fraction of the limits of load factor, angle of attack and sideslip that the limiter uses. The rest covers model error.
 const PART: f64 = 0.96;
 /// Pole ω of the law for load factor and angle of attack, rad/s.
 const PITCH_POLE: f64 = 10.0;
@@ -197,8 +197,8 @@ impl EnvelopeLimiter {
         }
     }
 
-    /// Limits the sideslip of an aircraft with a rudder. Without one no surface controls it: at full travel the X8's aileron changes
-    /// β̈ by less than a twentieth of what the law asks.
+    /// Limits the sideslip of an aircraft with a rudder. Without a rudder no surface controls the sideslip: at full travel
+    /// the X8's aileron changes β̈ by less than a twentieth of the β̈ that the law needs.
     fn keep_sideslip(&self, at: &Moment, out: &mut Limited) {
         let Some(rudder) = &self.model.airframe.actuators.rudder else {
             return;

@@ -1,4 +1,4 @@
-//! Envelope protection for every controller: load factor, angle of attack and bank.
+//! Envelope protection for every controller: load factor, angle of attack, bank and sideslip.
 
 mod bounds;
 mod guarded;

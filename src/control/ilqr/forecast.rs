@@ -21,7 +21,7 @@ struct Prediction {
 /// Predictions of the last ticks.
 #[derive(Clone, Debug)]
 pub(super) struct Forecast {
-    /// The prediction for a tick, at the tick's number modulo the span.
+    /// The prediction for each tick, at the tick's number modulo [`SPAN`].
     expected: [Option<Prediction>; SPAN],
     now: usize,
 }
@@ -36,8 +36,8 @@ impl Forecast {
         self.expected = [None; SPAN];
     }
 
-    /// Goes on to the next tick. Returns the error of the prediction for it, rad, without what the target has moved
-    /// since: the larger one of roll and pitch. `None` without a prediction.
+    /// Advances to the next tick. Returns the larger of the prediction's errors in roll and pitch, rad, each reduced by the
+    /// change of the target since the prediction. `None` if there is no prediction for this tick.
     pub fn error(&mut self, seen: &State, target: &Target) -> Option<f64> {
         self.now = (self.now + 1) % SPAN;
         let then = self.expected[self.now].take()?;
@@ -49,7 +49,7 @@ impl Forecast {
         Some(of(0).max(of(1)))
     }
 
-    /// Notes the state that the plan of this tick predicts after [`SPAN`] ticks.
+    /// Stores the state that the plan of this tick predicts after [`SPAN`] ticks.
     pub fn note(&mut self, after: &State, target: &Target) {
         self.expected[self.now] = Some(Prediction {
             attitude: [after.roll, after.pitch],

@@ -3,7 +3,7 @@
 //! Differential dynamic programming without second derivatives of the model (Todorov and Li, ACC 2005;
 //! Tassa, Mansard and Todorov, ICRA 2014, for limited commands), one iteration per tick from the last plan,
 //! which is the real-time iteration of Diehl et al. (2002). Throttle and attitude limits come from the
-//! LQI. The disturbance estimate is part of the prediction, so that there is no steady-state error.
+//! LQI. The prediction includes the disturbance estimate. The steady-state error is therefore zero.
 
 mod cost;
 mod course;
@@ -141,8 +141,9 @@ struct Desk {
 
 /// Starting points of a tick other than the last plan.
 struct Starts<'a> {
-    /// The LQI before this tick's command, and where its gains over the plan go.
+    /// The LQI before this tick's command.
     lqi: &'a Lqi,
+    /// Memory for the LQI's gains over the plan.
     ahead: &'a mut Ahead,
     actor: Option<&'a Actor>,
     units: &'a mut Units<f32>,
@@ -235,7 +236,7 @@ impl Controller for Ilqr {
         self.disturbance.update(&self.model, seen);
         let before = self.lqi.clone();
         let alone = self.lqi.command(seen, target);
-        // a model whose predictions are wrong must not be planned with
+        // planning must not use a model whose predictions are wrong
         let missed = self.forecast.error(&seen.state, target);
         let too_far = self.settings.missed.zip(missed).is_some_and(|(most, error)| error > most);
         if self.disturbance.is_wrong(TRUST) || too_far {

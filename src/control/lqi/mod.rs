@@ -104,7 +104,8 @@ impl Lqi {
                 *x += step;
             }
         }
-        self.reference = Some(reference);
+        // a reference that started at an unknown attitude starts again at the next tick
+        self.reference = Some(reference).filter(|x| x.iter().all(|x| x.is_finite()));
         reference
     }
 
@@ -218,5 +219,29 @@ impl Controller for Lqi {
         self.last = Some(Given { attitude, added, by_reference: law.by_reference() });
         let throttle = self.throttle(seen, target, law.throttle());
         Command { aileron: raw[0], elevator: raw[1], throttle, rudder: raw[2] }.clamped()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use greylag_physics::{ActuatorState, State, Time};
+    use std::path::Path;
+
+    #[test]
+    fn an_attitude_that_is_unknown_at_first_does_not_stay_in_the_reference() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
+        let model = GreyBox::load(&path).unwrap();
+        let mut controller = Lqi::new(&model).unwrap();
+        let seen = |roll: f64| Observation {
+            time: Time::default(),
+            state: State { roll, ..State::NEUTRAL },
+            actuators: ActuatorState::default(),
+            altitude: 600.0,
+            previous: [Command::IDLE; 2],
+        };
+        let target = Target { roll: 0.5, pitch: 0.1, airspeed: 16.67 };
+        assert!(!controller.command(&seen(f64::NAN), &target).is_finite());
+        assert!(controller.command(&seen(0.1), &target).is_finite());
     }
 }

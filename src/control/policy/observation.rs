@@ -16,7 +16,7 @@ pub const UNIT: [f64; OBSERVATIONS] =
 /// actuators δa δ̇a δe δ̇e δt, then the errors φ* − φ, θ* − θ and V_a* − V_a.
 ///
 /// The paper observes φ* and θ* instead of the errors. The information is the same, because φ and θ are observed too. The
-/// error has its own scale, because it must vanish. Airspeed is relative to 16.67 m/s, throttle to one half. The paper
+/// errors have their own scales, because they must converge to zero. Airspeed is relative to 16.67 m/s, throttle to one half. The paper
 /// commands the same airspeed in every episode and does not observe it. A policy trained in this way flies that airspeed
 /// at any airspeed command.
 #[inline(always)]

@@ -213,9 +213,10 @@ impl Track {
     }
 
     /// Time from the first sample to the last one at which `size` of the error exceeds `band`, plus the time that remained
-    /// when the aircraft was lost, s.
+    /// when the aircraft was lost, s. NaN if the band or all errors are unknown and the aircraft was not lost.
     fn stays(&self, errors: &[[f64; 2]], size: impl Fn(&[f64; 2]) -> f64, band: f64) -> f64 {
-        let Some(start) = self.moments.first().map(|m| m.time_s) else {
+        let unknown = band.is_nan() || errors.iter().all(|e| size(e).is_nan());
+        let Some(start) = self.moments.first().map(|m| m.time_s).filter(|_| !unknown) else {
             return if self.lost_s > 0.0 { self.lost_s } else { f64::NAN };
         };
         let away = errors.iter().rposition(|e| size(e) > band);

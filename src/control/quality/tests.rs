@@ -203,3 +203,14 @@ fn a_file_that_states_no_stall_has_no_limit_of_it() {
     assert_eq!([limits.stall_deg, limits.sideslip_deg], [f64::INFINITY; 2]);
     assert_eq!(limits.load_factor[0], f64::NEG_INFINITY);
 }
+
+/// A log without attitude, or without it at the start, must not look like one that was on the target at once.
+#[test]
+fn an_unknown_attitude_has_no_settling_time() {
+    let unknown = |t: f64| Moment { attitude: [f64::NAN; 2], ..level(t) };
+    let q = track(2.0, [30.0, 0.0], unknown).quality(&LIMITS);
+    assert!(q.to_one_deg_s.is_nan() && q.to_five_percent_s.is_nan(), "{q:?}");
+    let late = |t: f64| if t < 0.5 { unknown(t) } else { level(t) };
+    let q = track(2.0, [30.0, 0.0], late).quality(&LIMITS);
+    assert!(q.to_five_percent_s.is_nan() && (q.to_one_deg_s - 2.0).abs() < 1e-9, "{q:?}");
+}

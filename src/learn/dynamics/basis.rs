@@ -34,7 +34,7 @@ pub struct Basis {
     pub places: Vec<usize>,
     /// Initial coefficients θ_p0.
     start: DVector<f64>,
-    /// Physically possible ranges; `None` without bounds.
+    /// Bounds that the model states, or else the physical ones; `None` without bounds.
     bounds: Vec<Option<(f64, f64)>>,
     /// Prior information 1/σ² on θ_p0; zero if the model's file states no σ.
     information: DVector<f64>,
@@ -192,7 +192,7 @@ impl Basis {
         self.turn.transpose() * weighed
     }
 
-    /// Sets the coefficients of `model` from `coordinates`, clamped to their possible ranges.
+    /// Sets the coefficients of `model` from `coordinates`, clamped to their bounds.
     pub fn apply(&self, model: &mut GreyBox, coordinates: &[f64]) {
         let theta = &self.start + &self.turn * DVector::from_column_slice(coordinates);
         let mut values: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
@@ -214,7 +214,8 @@ impl Basis {
     }
 }
 
-/// Σ (∂(F_p/x_c)/∂θ)ᵀ (∂(F_p/x_c)/∂θ) / N over samples of the tracks.
+/// Σ (∂(F_p/x_c)/∂θ)ᵀ (∂(F_p/x_c)/∂θ) / N over samples of the tracks. Samples at which it is not finite are omitted,
+/// because the eigenvalue iteration would not end on a NaN.
 fn gram(model: &GreyBox, places: &[usize], tracks: &[Track]) -> DMatrix<f64> {
     let total: usize = tracks.iter().map(|t| t.states.len()).sum();
     let every = (total / SAMPLES).max(1);
@@ -226,6 +227,9 @@ fn gram(model: &GreyBox, places: &[usize], tracks: &[Track]) -> DMatrix<f64> {
             let columns = columns(model, track, k);
             let jacobian =
                 DMatrix::from_fn(8, places.len(), |i, j| columns[places[j]][i] / scale[i]);
+            if !jacobian.iter().all(|x| x.is_finite()) {
+                continue;
+            }
             gram += jacobian.transpose() * jacobian;
             count += 1.0;
         }
@@ -288,4 +292,28 @@ fn whiten(gram: &DMatrix<f64>) -> (DMatrix<f64>, Vec<usize>) {
         kept < 0.5
     };
     (turn, (0..n).filter(lost).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use greylag_physics::Controls;
+    use std::path::Path;
+
+    #[test]
+    fn a_sample_on_the_ground_or_without_a_state_does_not_count() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/prior.toml");
+        let model = GreyBox::load(&path).unwrap();
+        let controls = Controls { aileron: 0.1, elevator: -0.05, ..Controls::default() };
+        let flown = State { airspeed: 18.0, alpha: 0.05, p: 0.2, ..State::NEUTRAL };
+        let track = |states: &[State]| {
+            [Track::new(&model, states.iter().map(|state| (*state, controls, 100.0)))]
+        };
+        let lost = State { q: f64::NAN, ..flown };
+        let still = State { airspeed: 0.0, ..flown };
+        let places: Vec<usize> = (0..model.coefficients().len()).collect();
+        let whole = gram(&model, &places, &track(&[flown]));
+        assert!(whole.iter().all(|x| x.is_finite()) && whole.amax() > 0.0);
+        assert_eq!(gram(&model, &places, &track(&[flown, lost, still])), whole);
+    }
 }

@@ -204,13 +204,16 @@ fn quadrature(integrator: Integrator, channel: usize, k: usize) -> f64 {
 }
 
 /// The weighted least-squares step of the fitted parameters. `known` is the prior information on the first parameters,
-/// and their deviation from the prior mean. `None` if the normal equations cannot be solved.
+/// and their deviation from the prior mean. `None` if there are no rows or the normal equations cannot be solved.
 pub(super) fn solve(
     rows: &[Row],
     count: usize,
     weighting: Weighting,
     known: Option<(&DMatrix<f64>, &[f64])>,
 ) -> Option<DVector<f64>> {
+    if rows.is_empty() {
+        return None;
+    }
     let mut normal = DMatrix::zeros(count, count);
     let mut right = DVector::zeros(count);
     for i in 0..CHANNELS.len() {
@@ -253,4 +256,16 @@ pub(super) fn solve(
         normal[(k, k)] += 1e-12 * size;
     }
     normal.cholesky().map(|c| c.solve(&right))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Flights without a whole window give no rows. The training then reports that it has too little data.
+    #[test]
+    fn no_rows_have_no_solution() {
+        assert!(solve(&[], 2, Weighting::Tukey, None).is_none());
+        assert!(solve(&[], 2, Weighting::Alike, None).is_none());
+    }
 }

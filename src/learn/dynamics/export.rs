@@ -59,24 +59,14 @@ pub fn save(
     origin: &Origin,
     folder: &Path,
 ) -> Result<(), ExportError> {
-    let fail = |doing, path: &Path| {
-        let path = path.to_owned();
-        move |why| ExportError::File { doing, path, why }
-    };
     let text = std::fs::read_to_string(prior).map_err(fail("read", prior))?;
     let wrong = |why: String| ExportError::Prior { path: prior.into(), why };
     let mut table: toml::Table = toml::from_str(&text).map_err(|e| wrong(e.to_string()))?;
     let airframe = table.get("airframe").and_then(|a| a.as_str()).unwrap_or(AIRFRAME);
-    let airframe = prior.parent().unwrap_or(Path::new(".")).join(airframe);
+    let beside = prior.parent().unwrap_or(Path::new("."));
+    let airframe = beside.join(airframe);
     let airframe_text = std::fs::read(&airframe).map_err(fail("read", &airframe))?;
-    let mut own = Vec::new();
-    for effect in table.get("effect_files").and_then(|e| e.as_array()).into_iter().flatten() {
-        let path =
-            prior.parent().unwrap_or(Path::new(".")).join(effect.as_str().unwrap_or_default());
-        let bytes = std::fs::read(&path).map_err(fail("read", &path))?;
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        own.push((name, bytes));
-    }
+    let own = effect_files(&table, beside)?;
     // a model that is trained further keeps its name
     let base = model.name.strip_suffix("-learned").unwrap_or(&model.name);
     let name: String = format!("{base}-learned").chars().take(64).collect();
@@ -113,7 +103,46 @@ pub fn save(
     write(MODEL, text.as_bytes())
 }
 
-/// Writes the coefficient `name` of `model` into the model file's `table`; `None` if the table has no such entry.
+/// The error of a file that cannot be read or written.
+fn fail(doing: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> ExportError + use<> {
+    let path = path.to_owned();
+    move |why| ExportError::File { doing, path, why }
+}
+
+/// Name and content of each effect file of the model file `table` in the folder `beside`. A folder
+/// contributes its `.toml` files, as when the model is read. Files of the same name are renamed.
+fn effect_files(table: &toml::Table, beside: &Path) -> Result<Vec<(String, Vec<u8>)>, ExportError> {
+    let mut own: Vec<(String, Vec<u8>)> = Vec::new();
+    for effect in table.get("effect_files").and_then(|e| e.as_array()).into_iter().flatten() {
+        let path = beside.join(effect.as_str().unwrap_or_default());
+        for path in files_of(&path).map_err(fail("read", &path))? {
+            let bytes = std::fs::read(&path).map_err(fail("read", &path))?;
+            let plain = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let (mut name, mut number) = (plain.clone(), 1);
+            while [MODEL, AIRFRAME].contains(&name.as_str()) || own.iter().any(|o| o.0 == name) {
+                number += 1;
+                name = format!("{number}-{plain}");
+            }
+            own.push((name, bytes));
+        }
+    }
+    Ok(own)
+}
+
+/// The path itself, or the `.toml` files of the folder at `path` in the order of their names.
+fn files_of(path: &Path) -> std::io::Result<Vec<PathBuf>> {
+    if !path.is_dir() {
+        return Ok(vec![path.into()]);
+    }
+    let entries = std::fs::read_dir(path)?;
+    let mut all = entries.map(|e| Ok(e?.path())).collect::<std::io::Result<Vec<PathBuf>>>()?;
+    all.retain(|p| p.extension().is_some_and(|e| e == "toml"));
+    all.sort();
+    Ok(all)
+}
+
+/// Writes the coefficient `name` of `model` into the model file's `table`. A coefficient whose value comes from an effect
+/// file gets an entry. `None` if the table lacks the effect.
 fn write_trained(
     table: &mut toml::Table,
     model: &GreyBox,
@@ -126,8 +155,11 @@ fn write_trained(
         _ => ["effects"].into_iter().chain(name.split('.')).collect(),
     };
     let value = value.unwrap_or(model.bare_body().jxz);
-    let entry = path.iter().try_fold(table, |t, key| t.get_mut(*key)?.as_table_mut())?;
-    let before = entry.get("value").map(ToString::to_string).unwrap_or_default();
+    let (last, parents) = path.split_last()?;
+    let parent = parents.iter().try_fold(table, |t, key| t.get_mut(*key)?.as_table_mut())?;
+    let new = || toml::Value::Table(toml::Table::new());
+    let entry = parent.entry(*last).or_insert_with(new).as_table_mut()?;
+    let before = entry.get("value").map_or("the effect's file".into(), ToString::to_string);
     entry.insert("value".into(), value.into());
     let source = format!(
         "learned from flights (data {}), from {before}",
@@ -145,5 +177,41 @@ pub fn origin(model: &GreyBox, data: &str, seed: u64) -> Origin {
         data: data.into(),
         seed,
         program: concat!("greylag ", env!("CARGO_PKG_VERSION")).into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn effect_files_of_folders_are_all_copied_under_names_of_their_own() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, text) in [("a.toml", "1"), ("b.toml", "2"), ("notes.txt", "3")] {
+            std::fs::create_dir_all(folder.path().join("effects")).unwrap();
+            std::fs::write(folder.path().join("effects").join(name), text).unwrap();
+        }
+        std::fs::write(folder.path().join("a.toml"), "4").unwrap();
+        let read = |text: &str| -> toml::Table { toml::from_str(text).unwrap() };
+        let table = read("effect_files = [\"effects\", \"a.toml\"]");
+        let own = effect_files(&table, folder.path()).unwrap();
+        let own: Vec<_> = own.iter().map(|(name, text)| (name.as_str(), &text[..])).collect();
+        assert_eq!(own, [("a.toml", &b"1"[..]), ("b.toml", &b"2"[..]), ("2-a.toml", &b"4"[..])]);
+        let table = read("effect_files = [\"none.toml\"]");
+        assert!(matches!(effect_files(&table, folder.path()), Err(ExportError::File { .. })));
+    }
+
+    #[test]
+    fn a_trained_coefficient_whose_value_is_in_an_effect_file_gets_an_entry() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/prior.toml");
+        let mut model = GreyBox::load(&path).unwrap();
+        model.join("p_factor", &[0.4]).unwrap();
+        let origin = origin(&model, "0123456789abcdef", 1);
+        let mut table: toml::Table = toml::from_str("[effects.p_factor]\n").unwrap();
+        write_trained(&mut table, &model, "p_factor.k", &origin).unwrap();
+        let written = &table["effects"]["p_factor"]["k"];
+        assert_eq!(written["value"].as_float(), Some(0.4));
+        assert!(written["source"].as_str().unwrap().ends_with("from the effect's file"));
+        assert!(write_trained(&mut table, &model, "lift_linear.CL0", &origin).is_none());
     }
 }

@@ -3,8 +3,8 @@
 //! Prior and residual are learned together, and the prior is linear in its coefficients. For a given residual, the best
 //! coefficients leave no part of the residual in the span of ∂F_p/∂θ. They follow from a linear regression of the
 //! residual on these slopes, over the samples of the flights. The gradient of the rollouts approaches the same
-//! condition in the mean square. There a stall outside the prior's structure dominates the residual and biases the
-//! coefficients. Tukey's weights exclude the stall.
+//! condition in the mean square. In the mean square, a stall outside the prior's structure dominates the residual and
+//! biases the coefficients. Tukey's weights exclude the stall.
 
 use nalgebra::DVector;
 use rayon::prelude::*;

@@ -76,6 +76,8 @@ impl Trainer {
         let sizes: Vec<usize> =
             [INPUTS].into_iter().chain(recipe.hidden.iter().copied()).chain([OUTPUTS]).collect();
         let network = Dense::silent(&sizes, &mut stream::stream(recipe.seed, &[START]))?;
+        // layers that no residual may have must be rejected here, not when the trained model is made
+        Residual::new(network.clone(), &prior.airframe, prior.scale())?;
         let mut subject = Subject {
             scales: Scales::new(&prior.airframe, prior.scale()),
             prior: prior.clone(),
@@ -151,7 +153,13 @@ impl Trainer {
             self.prior.axes
         );
         let airframe = fingerprint(&self.prior.airframe);
-        hash(format!("{recipe} {prior} {airframe} {}", self.data).as_bytes())
+        // a prior without tables and effect files keeps its former identity
+        let tables: String =
+            self.prior.tables().map(|(id, table)| format!(" {id} {table:?}")).collect();
+        let grid = self.prior.thrust_grid().map(|grid| format!(" {grid:?}")).unwrap_or_default();
+        let written: String = self.prior.written().map(|own| format!(" {}", own.text)).collect();
+        let data = &self.data;
+        hash(format!("{recipe} {prior} {airframe} {data}{tables}{grid}{written}").as_bytes())
     }
 
     /// Number of updates made.

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::checkpoint::write_whole;
 use greylag_num::statistics::{interquartile_mean, quantile};
 
 /// File name of a curve.
@@ -59,11 +60,15 @@ impl CurvePoint {
         )
     }
 
-    /// Sum of both errors, degrees, or the negative reward if there is no evaluation. The best point has the smallest
-    /// value.
+    /// Sum of both errors, degrees, or the negative reward if there is no evaluation. Infinite without either. The best
+    /// point has the smallest value.
     pub fn badness(&self) -> f64 {
         let error = self.easy_deg + self.hard_deg;
-        if error.is_nan() { -self.reward } else { error }
+        match (error.is_nan(), self.reward.is_nan()) {
+            (false, _) => error,
+            (true, false) => -self.reward,
+            (true, true) => f64::INFINITY,
+        }
     }
 }
 
@@ -127,7 +132,8 @@ pub fn spread(
     for &x in at {
         let value = |points: &&[CurvePoint]| {
             let after = points.partition_point(|p| over(p) < x);
-            let (Some(b), a) = (points.get(after), &points[after.saturating_sub(1)]) else {
+            let (Some(b), Some(a)) = (points.get(after), points.get(after.saturating_sub(1)))
+            else {
                 return f64::NAN;
             };
             match (over(b) == x, after) {
@@ -153,8 +159,8 @@ pub struct CurveFile {
 }
 
 impl CurveFile {
-    /// Opens the curve in `path` to continue it after `steps`. Later points are removed. A new curve is started if
-    /// there is no file.
+    /// Opens the curve in `path` to continue it after `steps`. Later points are removed, by an atomic replacement of the
+    /// file. A new curve is started if there is no file.
     ///
     /// # Errors
     ///
@@ -165,12 +171,9 @@ impl CurveFile {
             points => points.map_err(std::io::Error::other)?,
         };
         points.retain(|p| p.steps <= steps);
-        let mut file = File::create(path)?;
-        writeln!(file, "{COLUMNS}")?;
-        for point in &points {
-            writeln!(file, "{}", point.line())?;
-        }
-        Ok(CurveFile { file, points })
+        let lines: String = points.iter().map(|point| point.line() + "\n").collect();
+        write_whole(path, format!("{COLUMNS}\n{lines}").as_bytes())?;
+        Ok(CurveFile { file: File::options().append(true).open(path)?, points })
     }
 
     /// Points of the curve.
@@ -249,6 +252,31 @@ mod tests {
         assert!(CurveFile::open(&path, 10).unwrap().points().is_empty());
     }
 
+    /// A program that ends while the curve is shortened leaves the old file or the new one.
+    #[test]
+    fn a_curve_is_shortened_in_a_new_file() {
+        use std::io::Read as _;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(CURVE);
+        let mut file = CurveFile::open(&path, 0).unwrap();
+        [10, 20, 30].into_iter().for_each(|steps| file.add(point(steps, 1.0)).unwrap());
+        let mut before = File::open(&path).unwrap();
+        let mut again = CurveFile::open(&path, 20).unwrap();
+        again.add(point(25, 1.0)).unwrap();
+        let mut text = String::new();
+        before.read_to_string(&mut text).unwrap();
+        assert_eq!(text.lines().count(), 4, "{text}");
+        assert_eq!(read(&path).unwrap().last().map(|p| p.steps), Some(25));
+    }
+
+    #[test]
+    fn a_point_without_error_and_reward_is_not_the_best() {
+        let nothing = CurvePoint { easy_deg: f64::NAN, reward: f64::NAN, ..point(2, 0.0) };
+        assert_eq!(best(&[point(1, 3.0), nothing]), Some(0));
+        assert_eq!(CurvePoint { reward: -0.2, ..nothing }.badness(), 0.2);
+        assert_eq!(nothing.badness(), f64::INFINITY);
+    }
+
     #[test]
     fn the_knee_is_where_nine_tenths_of_the_way_are_made() {
         let points = [(1, 11.0), (2, 3.0), (3, 1.9), (4, 1.0), (5, 1.5)].map(|(s, e)| point(s, e));
@@ -268,5 +296,8 @@ mod tests {
         assert_eq!(spread.middle[..3], [6.0, 4.5, 3.0]);
         assert_eq!((spread.low[1], spread.high[1]), (3.0, 6.0));
         assert!(spread.middle[3].is_nan());
+        // a curve before its first point
+        let empty = super::spread(&[&[]], |p| p.seconds, |p| p.easy_deg, &[0.0]);
+        assert!(empty.middle[0].is_nan());
     }
 }

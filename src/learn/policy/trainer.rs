@@ -163,7 +163,8 @@ impl<W: World> PolicyTrainer<W> {
     ///
     /// If a loss is not finite or the environment fails.
     pub fn run(&mut self, steps: u64) -> Result<PolicyProgress, PolicyError> {
-        let until = (self.steps + steps).min(self.recipe.steps).min(self.next_checkpoint());
+        let until = self.steps.saturating_add(steps);
+        let until = until.min(self.recipe.steps).min(self.next_checkpoint());
         while self.steps < until {
             self.advance()?;
         }

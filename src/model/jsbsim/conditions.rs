@@ -207,6 +207,7 @@ fn same(first: &GreyBox, second: &GreyBox) -> Result<(), ConditionsError> {
         ("surfaces and motors", one.mixer == other.mixer),
         ("mass and inertia", first.body == second.body),
         ("force axes", first.axes == second.axes),
+        ("thrust tables", first.thrust_grid() == second.thrust_grid()),
     ] {
         if !same {
             return Err(differ(what));
@@ -221,5 +222,41 @@ fn same(first: &GreyBox, second: &GreyBox) -> Result<(), ConditionsError> {
     match lacking.or_else(|| theirs.iter().find(|c| !ours.contains(c))) {
         Some((name, _)) => Err(differ(&format!("values of {name}"))),
         None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jsbsim::{export, export_in_conditions};
+    use greylag_num::Grid;
+    use std::path::Path;
+
+    fn model() -> GreyBox {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/aerosonde/jsbsim.toml");
+        GreyBox::load(&path).unwrap()
+    }
+
+    #[test]
+    fn models_with_different_thrust_tables_are_not_one_aircraft() {
+        let mut other = model();
+        let values = [vec![0.0, -1.0], vec![90.0, 0.0]];
+        let grid = Grid::new(&[0.0, 1.0], &[0.0, 50.0], &values).unwrap();
+        for term in other.terms.iter_mut().filter(|term| term.points.grid.is_some()) {
+            term.points.grid = Some(grid.clone());
+        }
+        let why = export_in_conditions(&[model(), other], "a").unwrap_err().to_string();
+        assert!(why.contains("thrust tables differ"), "{why}");
+    }
+
+    #[test]
+    fn a_name_with_two_hyphens_does_not_break_the_comment() {
+        let mut model = model();
+        model.name = "a---b".into();
+        let text = &export(&model, "a").files[0].1;
+        let (_, rest) = text.split_once("<!--").unwrap();
+        let (comment, _) = rest.split_once("-->").unwrap();
+        assert!(comment.contains("from the model") && comment.ends_with(". "), "{comment}");
+        assert!(!comment.contains("--"), "{comment}");
     }
 }
