@@ -93,6 +93,11 @@ impl Ports {
         }
     }
 
+    /// The error of the signing timestamp's file that was not returned yet; `None` without one.
+    pub(super) fn trouble(&self) -> Option<String> {
+        self.guard.as_ref().and_then(Guard::trouble)
+    }
+
     /// Signing counters; `None` without signing.
     pub(super) fn signing(&self) -> Option<SigningCounts> {
         self.guard.as_ref().map(Guard::counts)
