@@ -70,6 +70,7 @@ fn main() {
         answer: None,
         failing: Some(&found),
         held_out: None,
+        effect_files: std::collections::BTreeMap::new(),
         model_file: String::new(),
         log_files: Vec::new(),
         command_line: String::new(),

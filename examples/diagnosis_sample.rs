@@ -21,6 +21,7 @@ fn main() -> anyhow::Result<()> {
         answer: Some(&answer),
         failing: Some(&failing),
         held_out: Some(&held_out),
+        effect_files: std::collections::BTreeMap::new(),
         model_file: "params/x8/prior.toml".into(),
         log_files: vec!["train-1.csv".into(), "train-2.csv".into(), "train-3.ulg".into()],
         command_line: "diagnosis_sample OUT.html".into(),

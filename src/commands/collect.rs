@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
 
+use greylag_sitl::plant::PlantOptions;
 use greylag_sitl::plant_arguments::PlantArgs;
 
 use crate::commands::files::shipped;
@@ -17,6 +18,9 @@ use crate::logs::csv;
 use crate::model::GreyBox;
 use crate::sim::Simulator;
 use crate::sim::collect::{Place, explore};
+
+/// File in a round's folder with the options that its episodes share.
+const OPTIONS: &str = "options.txt";
 
 /// Options of `greylag collect`.
 #[derive(clap::Args)]
@@ -102,6 +106,7 @@ pub fn fly(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     start::describe(&mut plant, &models)?;
     plant.start = arguments.start.start(&plant.aircraft, &models)?;
     start::introduce(&plant, &models)?;
+    keep_options(&folder, &shared_options(arguments, &plant))?;
     let flown = AtomicU32::new(0);
     (0..count).into_par_iter().try_for_each_init(
         || (Simulator::new(&plant), controller.as_ref().map(|c| c.boxed_clone())),
@@ -138,4 +143,75 @@ fn save(flight: &crate::logs::Flight, path: &Path) -> Result<()> {
     let _ = std::fs::remove_file(&part);
     csv::save(flight, &part)?;
     std::fs::rename(&part, path).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// The options that the episodes of a round share, one a line. The model is left out: its path may be written in another
+/// way.
+fn shared_options(arguments: &Arguments, plant: &PlantOptions) -> String {
+    let hidden: Vec<String> = plant.hidden.iter().map(ToString::to_string).collect();
+    format!(
+        "seed {}\naircraft {}\nhidden {}\nset {:?}\nair {:?}\nstart {} m/s, {} m\ncontroller {}\n",
+        arguments.seed,
+        plant.aircraft,
+        hidden.join(" "),
+        plant.held,
+        plant.air,
+        plant.start.airspeed_mps,
+        plant.start.altitude_m,
+        arguments.controller.map_or("none", Explorer::name)
+    )
+}
+
+/// Stores `options` in `folder`.
+///
+/// # Errors
+/// If the folder holds episodes that were flown with other options. Episodes without a file of options, as earlier
+/// versions wrote them, are accepted.
+fn keep_options(folder: &Path, options: &str) -> Result<()> {
+    let path = folder.join(OPTIONS);
+    let entries = std::fs::read_dir(folder)
+        .with_context(|| format!("cannot read {}", folder.display()))?
+        .collect::<std::io::Result<Vec<_>>>()?;
+    let flown = entries.iter().any(|entry| entry.path().extension().is_some_and(|e| e == "csv"));
+    if flown && !path.exists() {
+        return Ok(());
+    }
+    if flown {
+        let there = std::fs::read_to_string(&path)
+            .with_context(|| format!("cannot read {}", path.display()))?;
+        let differs = there.lines().zip(options.lines()).find(|(there, here)| there != here);
+        if let Some((there, here)) = differs {
+            bail!(
+                "{} holds episodes with `{there}`, not `{here}`; give another --out, or the same options",
+                folder.display()
+            );
+        }
+        return Ok(());
+    }
+    let part = path.with_extension("part");
+    std::fs::write(&part, options)
+        .and_then(|()| std::fs::rename(&part, &path))
+        .with_context(|| format!("cannot write {}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn episodes_of_other_options_are_not_mixed() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        // Without episodes the options may change.
+        keep_options(folder, "seed 1\naircraft x8\n").unwrap();
+        keep_options(folder, "seed 2\naircraft x8\n").unwrap();
+        std::fs::write(folder.join("episode-000.csv"), "").unwrap();
+        keep_options(folder, "seed 2\naircraft x8\n").unwrap();
+        let refused = keep_options(folder, "seed 2\naircraft c172p\n").unwrap_err().to_string();
+        assert!(refused.contains("`aircraft x8`, not `aircraft c172p`"), "{refused}");
+        // An earlier version wrote no options.
+        std::fs::remove_file(folder.join(OPTIONS)).unwrap();
+        keep_options(folder, "seed 3\naircraft x8\n").unwrap();
+        assert!(!folder.join(OPTIONS).exists());
+    }
 }

@@ -1,5 +1,6 @@
 //! `greylag diagnose`: which physical effect a model lacks.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -9,7 +10,7 @@ use serde::Serialize;
 
 use crate::commands::bar::{Bar, shares};
 use crate::commands::distinct::distinct;
-use crate::commands::effect_files::named_effects;
+use crate::commands::effect_files::{file_words, named_effects};
 use crate::commands::files;
 use crate::commands::given;
 use crate::commands::intake::{Intake, LogArguments};
@@ -94,14 +95,15 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     notes.append(&mut diagnosis.notes);
     diagnosis.notes = notes;
     let Diagnosed { tuned, answer } = diagnosed(&model, &flights, &diagnosis)?;
-    let next = next(arguments, &diagnosis, answer.numbers.change_percent);
+    let words = file_words(&arguments.effects)?;
+    let next = next(arguments, &diagnosis, &words, answer.numbers.change_percent);
     let answer = answer.then(next);
     // drawn before anything is written, so that Ctrl-C leaves nothing behind
     let drawn = arguments.report.as_ref().map(|path| {
         let mut models = [tuned, model.clone()];
         models[1].name = "as given".into();
         let told = (&diagnosis, &answer);
-        let page = page(arguments, told, &models, &flights, &part(&on_stage, drawing))?;
+        let page = page(arguments, told, &words, &models, &flights, &part(&on_stage, drawing))?;
         Ok::<_, anyhow::Error>((path, page))
     });
     let drawn = drawn.transpose()?;
@@ -136,14 +138,20 @@ struct Document<'a> {
 /// Smallest reduction of the error by tuning for which a tuning command is recommended, %.
 const WORTH_TUNING: f64 = 1.0;
 
-/// The command that comes next. `change_percent` is the change of the error by tuning and effects, %.
-fn next(arguments: &Arguments, diagnosis: &Diagnosis, change_percent: f64) -> String {
+/// The command that comes next. `words` name effects of files. `change_percent` is the change of the error by tuning and
+/// effects, %.
+fn next(
+    arguments: &Arguments,
+    diagnosis: &Diagnosis,
+    words: &BTreeMap<String, String>,
+    change_percent: f64,
+) -> String {
     let model = &arguments.model;
     let out = model.parent().unwrap_or(Path::new("")).join("amended");
     let (model, out, logs) = (quoted(model), quoted(&out), arguments.logs.words());
     let between = diagnosis.advice.iter().find_map(|a| a.between.as_ref());
     match (diagnosis.verdict, between) {
-        (Verdict::Effect, Some(pair)) if in_doubt(diagnosis) => design(&model, pair),
+        (Verdict::Effect, Some(pair)) if in_doubt(diagnosis) => design(&model, pair, words),
         (Verdict::Effect, _) => format!("greylag amend --model {model}{logs} --accept --out {out}"),
         (Verdict::Adequate, _) if change_percent > -WORTH_TUNING => {
             format!("greylag aircraft check --model {model}")
@@ -164,7 +172,8 @@ fn next(arguments: &Arguments, diagnosis: &Diagnosis, change_percent: f64) -> St
 }
 
 /// The command that designs a manoeuvre to distinguish two effects.
-fn design(model: &str, [a, b]: &[String; 2]) -> String {
+fn design(model: &str, pair: &[String; 2], words: &BTreeMap<String, String>) -> String {
+    let [a, b] = pair.each_ref().map(|id| words.get(id).unwrap_or(id));
     format!("greylag design --model {model} --between {a} {b}")
 }
 
@@ -177,6 +186,7 @@ fn in_doubt(diagnosis: &Diagnosis) -> bool {
 fn page(
     arguments: &Arguments,
     (diagnosis, answer): (&Diagnosis, &Answer),
+    effect_files: &BTreeMap<String, String>,
     models: &[GreyBox],
     flights: &[Reconstruction],
     progress: &Progress,
@@ -189,6 +199,7 @@ fn page(
         failing: Some(&failing),
         held_out: None,
         model_file: arguments.model.display().to_string(),
+        effect_files: effect_files.clone(),
         log_files: arguments.logs.paths.iter().map(|p| p.display().to_string()).collect(),
         command_line: files::command_line(),
         versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
@@ -310,8 +321,12 @@ mod tests {
 
     #[test]
     fn the_command_that_comes_next_is_whole() {
-        let line = design("model.toml", &["lift_stall", "lift_alpha2"].map(String::from));
-        let words: Vec<_> = line.split(' ').skip(1).map(std::ffi::OsString::from).collect();
-        assert!(matches!(command_of(&words), Ok(Command::Design(_))), "{line}");
+        let files = BTreeMap::from([("mine".to_owned(), "effects/mine.toml".to_owned())]);
+        for (second, named) in [("lift_alpha2", "lift_alpha2"), ("mine", "effects/mine.toml")] {
+            let line = design("model.toml", &["lift_stall", second].map(String::from), &files);
+            assert!(line.ends_with(&format!(" --between lift_stall {named}")), "{line}");
+            let words: Vec<_> = line.split(' ').skip(1).map(std::ffi::OsString::from).collect();
+            assert!(matches!(command_of(&words), Ok(Command::Design(_))), "{line}");
+        }
     }
 }

@@ -1,10 +1,12 @@
 //! Effects that a user names by id, by effect file or by a folder of effect files.
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 
 use crate::commands::files::shipped;
+use crate::logs::quoted;
 use crate::physics::effects::Kind;
 use crate::physics::formula::register;
 
@@ -29,6 +31,40 @@ pub fn named_effects(effects: &[String]) -> Result<Vec<String>> {
     Ok(ids)
 }
 
+/// The words by which a command line names the effects of files among `effects`, by id: the file's path, quoted.
+///
+/// # Errors
+/// If a file cannot be read or is no effect file.
+pub fn file_words(effects: &[String]) -> Result<BTreeMap<String, String>> {
+    let mut words = BTreeMap::new();
+    for named in effects {
+        let path = Path::new(named);
+        let files = match shipped(path) {
+            folder if folder.is_dir() => folder_files(path, &folder)?,
+            _ if is_file(named) => vec![path.to_owned()],
+            _ => continue,
+        };
+        for file in files {
+            let read = register::load(&shipped(&file))?;
+            words.extend(read.iter().map(|effect| (effect.about.id.to_owned(), quoted(&file))));
+        }
+    }
+    Ok(words)
+}
+
+/// The effect files in `folder`, which the user named `named`.
+fn folder_files(named: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        let file = named.join(entry?.file_name());
+        if file.extension().is_some_and(|e| e == "toml") {
+            files.push(file);
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
 /// Whether `named` is the name of a file. An id has neither a dot nor a slash.
 pub fn is_file(named: &str) -> bool {
     named.contains(['.', '/', '\\'])
@@ -38,4 +74,22 @@ pub fn is_file(named: &str) -> bool {
 pub fn own_effects(ids: &[String]) -> Vec<String> {
     let own = |id: &&String| Kind::from_id(id).is_some_and(|kind| kind.written().is_some());
     ids.iter().filter(own).cloned().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_effect_of_a_file_is_named_by_its_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("my effect.toml");
+        std::fs::copy("params/effects/yaw_by_throttle.toml", &file).unwrap();
+        for named in [folder.path(), &file] {
+            let named = [named.display().to_string(), "drag_beta2".into()];
+            let words = file_words(&named).unwrap();
+            let expected = BTreeMap::from([("yaw_by_throttle".to_owned(), quoted(&file))]);
+            assert_eq!(words, expected, "{named:?}");
+        }
+    }
 }

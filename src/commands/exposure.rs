@@ -1,7 +1,9 @@
 //! Access control of the clients' links: links of this machine, signed links, or links that the user allows explicitly.
+//! The vehicle's link may be open, with a warning.
 
 use anyhow::{Result, bail};
 
+use crate::flight::runtime::VehicleLink;
 use crate::link::address::Address;
 
 /// Refuses unsigned links that other machines can reach, unless the user allows them. Returns a warning for allowed
@@ -23,6 +25,16 @@ pub fn check<'a>(
         );
     }
     Ok(Some(format!("INSECURE: whoever reaches {links} steers the aircraft")))
+}
+
+/// Warning about an unsigned vehicle's link that other machines can reach; `None` for any other link.
+pub fn vehicle(address: &Address, link: VehicleLink) -> Option<String> {
+    (link == VehicleLink::Open && !address.stays_here()).then(|| {
+        format!(
+            "INSECURE: whoever reaches {address} can send false states of the vehicle: sign its link (--sign FILE \
+             --sign-vehicle)"
+        )
+    })
 }
 
 /// Exposure that the user allows.
@@ -54,5 +66,16 @@ mod tests {
         assert!(!refused.contains("127.0.0.1"), "{refused}");
         let said = check(open.iter(), Asked::Insecure).unwrap().unwrap();
         assert!(said.contains("INSECURE: whoever reaches udpin:0.0.0.0:14550"), "{said}");
+    }
+
+    #[test]
+    fn an_unsigned_vehicle_link_that_other_machines_reach_is_warned_of() {
+        let open: Address = "udpin:0.0.0.0:14560".parse().unwrap();
+        let said = vehicle(&open, VehicleLink::Open).unwrap();
+        assert!(said.contains("udpin:0.0.0.0:14560") && said.contains("--sign-vehicle"), "{said}");
+        assert_eq!(vehicle(&open, VehicleLink::Signed), None);
+        for here in ["udpin:127.0.0.1:14560", "serial:/dev/ttyAMA0:921600"] {
+            assert_eq!(vehicle(&here.parse().unwrap(), VehicleLink::Open), None, "{here}");
+        }
     }
 }

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use comfy_table::Table;
@@ -29,6 +29,10 @@ use search::Search;
 
 /// Name of the default aircraft.
 const AIRCRAFT: &str = "x8";
+
+/// Error of a scenario or a monitor campaign with several controllers.
+const ONE_CONTROLLER: &str =
+    "--scenario and --monitor fly one controller: give --controller one name";
 
 /// The arguments of `greylag faults`.
 #[derive(Args)]
@@ -70,12 +74,12 @@ pub struct Arguments {
     #[arg(long, value_name = "N", conflicts_with_all = ["flights", "resume", "show"])]
     search: Option<u64>,
     /// Fly the scenario in this file (JSON, as `--search` prints it) and show how far each rule is from being broken.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["flights", "resume", "show", "search", "json"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["flights", "resume", "show", "search", "json", "counterpart"])]
     scenario: Option<PathBuf>,
     /// Fly this number of flights, healthy and with each failure, under the model monitor, with a
     /// simulated ArduPlane whose attitude has errors drawn for each flight: false alarms and
     /// delays. `--first` is the first seed.
-    #[arg(long, value_name = "N", conflicts_with_all = ["flights", "resume", "show", "search", "scenario", "json"])]
+    #[arg(long, value_name = "N", conflicts_with_all = ["flights", "resume", "show", "search", "scenario", "json", "counterpart"])]
     monitor: Option<u64>,
     #[command(flatten)]
     json: JsonArgument,
@@ -112,6 +116,8 @@ fn counterparts() -> impl TypedValueParser<Value = Counterpart> {
 /// # Errors
 /// If an aircraft or a controller cannot be built, or the file of `--resume` cannot be used.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let single = arguments.scenario.is_some() || arguments.monitor.is_some();
+    ensure!(!single || arguments.controller.len() == 1, "{ONE_CONTROLLER}");
     arguments.json.writable(Overwrite::New)?;
     let quiet = arguments.json.takes_stdout();
     let model = fly::model(&arguments.model, None)?;

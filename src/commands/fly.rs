@@ -167,8 +167,12 @@ impl Arguments {
         self.clients.iter().filter(move |_| !signed).chain(&self.local)
     }
 
+    fn vehicle_link(&self) -> VehicleLink {
+        if self.sign_vehicle { VehicleLink::Signed } else { VehicleLink::Open }
+    }
+
     fn signing(&self) -> Option<Signing> {
-        let vehicle = if self.sign_vehicle { VehicleLink::Signed } else { VehicleLink::Open };
+        let vehicle = self.vehicle_link();
         self.sign.clone().map(|key| Signing { key, vehicle, local: self.local.clone() })
     }
 
@@ -219,7 +223,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         companion.pilot.follow(Schedule::load(path)?);
     }
     companion.pilot.monitor_with(Monitor::new(model.clone()));
-    if let Some(words) = exposed {
+    let vehicle = exposure::vehicle(&arguments.vehicle, arguments.vehicle_link());
+    for words in exposed.into_iter().chain(vehicle) {
         companion.pilot.send_text(Severity::Warning, &words);
     }
     let mut options = options(arguments, &model);

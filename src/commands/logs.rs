@@ -8,6 +8,7 @@ use clap::Subcommand;
 
 use crate::commands::files;
 use crate::commands::mapping_file::mapping;
+use crate::commands::mistake;
 use crate::commands::status::IN_DOUBT;
 use crate::logs::finding::Severity;
 use crate::logs::info::Info;
@@ -126,18 +127,19 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             let model =
                 model.as_deref().map(|path| GreyBox::load(&files::shipped(path))).transpose()?;
             let options = reading.options(model.as_ref())?;
-            let of = |file: &PathBuf| Ok(crate::logs::inspect_all(file, &options)?);
-            let all = files.iter().map(of).collect::<Result<Vec<Vec<Log>>>>()?;
-            let all: Vec<Info> = all.iter().flatten().map(Info::of).collect();
+            let (logs, broken) = inspected(files, &options)?;
+            let all: Vec<Info> = logs.iter().map(Info::of).collect();
             match (json, &all[..]) {
-                (true, [only]) => println!("{}", serde_json::to_string_pretty(only)?),
+                (true, [only]) if !broken => println!("{}", serde_json::to_string_pretty(only)?),
                 (true, all) => println!("{}", serde_json::to_string_pretty(all)?),
                 (false, all) => print_all(all),
             }
             if let Some(path) = write_mapping {
-                return write_mapping_file(path, &all);
+                write_mapping_file(path, &all)?;
+                return Ok(status(broken.then_some(Severity::Problem)));
             }
-            Ok(status(all.iter().map(Info::severity).max()))
+            let worst = all.iter().map(Info::severity).max();
+            Ok(status(if broken { Some(Severity::Problem) } else { worst }))
         }
         Verb::Convert { input, output, model, force, reading } => {
             files::writable(output, (*force).into())?;
@@ -162,14 +164,34 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
 }
 
+/// The flights of the logs in `files`, and whether a log could not be read. Errors are printed to standard error.
+///
+/// # Errors
+/// The error of the last log if none can be read.
+fn inspected(files: &[PathBuf], options: &Options) -> Result<(Vec<Log>, bool)> {
+    let (mut logs, mut broken) = (Vec::new(), Vec::new());
+    for file in files {
+        match crate::logs::inspect_all(file, options) {
+            Ok(flights) => logs.extend(flights),
+            Err(why) => broken.push(anyhow::Error::from(why)),
+        }
+    }
+    let last = if logs.is_empty() { broken.pop() } else { None };
+    broken.iter().for_each(|error| eprintln!("greylag: {}", mistake::text(error)));
+    match last {
+        Some(error) => Err(error),
+        None => Ok((logs, !broken.is_empty())),
+    }
+}
+
 /// Writes the mapping that corrects the findings.
-fn write_mapping_file(path: &Path, logs: &[Info]) -> Result<ExitCode> {
+fn write_mapping_file(path: &Path, logs: &[Info]) -> Result<()> {
     let Some(text) = mapping(logs) else {
         bail!("no factor puts anything of these logs right, so no mapping was written");
     };
     files::write(path, &text, files::Overwrite::New)?;
     println!("\nwrote {}; add: --mapping {}", path.display(), quoted(path));
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 fn csv_file(flight: &Flight, output: &Path, force: bool) -> Result<()> {

@@ -230,7 +230,8 @@ impl Replayed<'_, '_> {
             return !ended;
         };
         let request = self.companion.pilot.observe(state.time, &state);
-        let heard = request.filter(|_| planned != Planned::Busy);
+        // a busy planner did not receive the request, and a controller that has ended gave no answer
+        let heard = request.filter(|_| !matches!(planned, Planned::Busy | Planned::None));
         if heard.is_none() {
             self.owed |= request.is_some_and(|request| request.engage);
         }

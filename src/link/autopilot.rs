@@ -70,7 +70,7 @@ pub enum Severity {
 pub struct Text {
     /// Severity of the line.
     pub severity: Severity,
-    /// The text. Its first 400 characters are sent, in chunks of 50 characters.
+    /// The text. Up to 400 characters are sent, in chunks of 50 characters. A longer text is cut and ends with `...`.
     pub words: String,
 }
 

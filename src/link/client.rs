@@ -40,6 +40,8 @@ const FORGOTTEN: Duration = Duration::from_secs(60);
 const TEXTS_PER_POLL: usize = 8;
 /// Longest text that is sent, in characters: eight chunks.
 const TEXT_LENGTH: usize = 400;
+/// End of a text that was cut. STATUSTEXT holds ASCII.
+const CUT: &str = "...";
 
 /// Host time and vehicle time at a call.
 ///
@@ -302,7 +304,9 @@ impl Clients {
     /// Queues a text for one client.
     fn say(&mut self, at: usize, severity: Severity, words: &str) {
         self.text_id = self.text_id.checked_add(1).unwrap_or(1);
-        let words = words.char_indices().nth(TEXT_LENGTH).map_or(words, |(end, _)| &words[..end]);
+        let cut = (words.chars().count() > TEXT_LENGTH)
+            .then(|| words.chars().take(TEXT_LENGTH - CUT.len()).collect::<String>() + CUT);
+        let words = cut.as_deref().unwrap_or(words);
         self.sessions[at].say(severity, words, self.text_id, self.identity, &mut self.outbox);
     }
 

@@ -177,6 +177,7 @@ impl Bench {
             if flight >= inner.session.logs.len() {
                 return Err(WorkbenchError::NoFlight(flight));
             }
+            inner.note_removal(flight);
             inner.session.logs.remove(flight);
             drop(inner.flights.remove(flight));
             Ok(())

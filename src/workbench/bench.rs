@@ -30,7 +30,8 @@ pub struct Given {
     pub folder: PathBuf,
     /// Path of the model file; required for a new session.
     pub model: Option<PathBuf>,
-    /// Logs to add; a log that the session already contains is skipped.
+    /// Logs to add; a log that the session already contains is skipped. A file that is no usable log is added as an unused flight
+    /// with its error.
     pub logs: Vec<PathBuf>,
     /// Options for reading logs.
     pub reading: Reading,
@@ -208,16 +209,6 @@ impl Bench {
         drop(inner);
         (self.on_event)(Event::Changed { revision });
         written
-    }
-
-    /// Adds the log at `path`; does nothing if the session already contains it.
-    fn add_file(&self, path: &Path) -> Result<(), WorkbenchError> {
-        let path = fs::canonicalize(path).map_err(|e| io(path, e))?;
-        let bytes = fs::read(&path).map_err(|e| io(&path, e))?;
-        match self.add(self.revision(), path, &bytes, None) {
-            Err(WorkbenchError::Twice(_)) => Ok(()),
-            other => other,
-        }
     }
 
     /// Adds the log at `path` with the content `bytes`. Without a `role`, its role is that of [`Session::usual_role`].

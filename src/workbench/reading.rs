@@ -3,15 +3,17 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::bench::Inner;
+use super::bench::{Bench, Inner};
 use super::error::{WorkbenchError, io};
 use super::flights::Loaded;
 use super::mapping::FILE;
+use super::session::{LogEntry, Role};
 use greylag_logs as logs;
 use greylag_logs::csv::Tolerance;
 use greylag_logs::mapping::Mapping;
 use greylag_logs::quoted;
 use greylag_logs::sources::Asked;
+use greylag_sysid::amend::document::sha256;
 
 /// Command-line options for reading logs.
 #[derive(Clone, Debug, Default)]
@@ -49,7 +51,40 @@ impl Reading {
     }
 }
 
+impl Bench {
+    /// Adds the log at `path`, which the command line names; does nothing if the session already contains it. A log that cannot
+    /// be used joins the session as an unused flight with its error, so that the session opens.
+    ///
+    /// # Errors
+    /// If the file cannot be read or the session cannot be written.
+    pub(super) fn add_file(&self, path: &Path) -> Result<(), WorkbenchError> {
+        use WorkbenchError as E;
+        let path = fs::canonicalize(path).map_err(|e| io(path, e))?;
+        let bytes = fs::read(&path).map_err(|e| io(&path, e))?;
+        match self.add(self.revision(), path.clone(), &bytes, None) {
+            Err(E::Twice(_)) => Ok(()),
+            Err(why @ (E::Log(_) | E::Reconstruct(_) | E::Clock(_))) => {
+                let entry = LogEntry { path, sha256: sha256(&bytes), role: Role::Unused };
+                self.change(self.revision(), |inner| {
+                    inner.take_unusable(entry, why.to_string());
+                    Ok(())
+                })
+            }
+            other => other,
+        }
+    }
+}
+
 impl Inner {
+    /// Adds a log that cannot be used, for the reason `why`. A log of the same path stays: its error says that it has changed.
+    fn take_unusable(&mut self, entry: LogEntry, why: String) {
+        let there = self.session.logs.iter().any(|l| self.folder.join(&l.path) == entry.path);
+        if !there {
+            self.session.logs.push(entry);
+            self.flights.push(Err(why));
+        }
+    }
+
     /// Loads the mapping of the command line or, without one, the session's mapping if it exists.
     pub fn take_mapping(&mut self) -> Result<(), WorkbenchError> {
         let own = Some(self.folder.join(FILE)).filter(|path| path.exists());
@@ -73,7 +108,7 @@ impl Inner {
 
     /// Reads all logs again.
     pub fn reread(&mut self) {
-        let read = |entry: &super::session::LogEntry| {
+        let read = |entry: &LogEntry| {
             Loaded::read(entry, &self.folder, &self.options, &self.model).map_err(|e| e.to_string())
         };
         self.flights = self.session.logs.iter().map(read).collect();

@@ -25,7 +25,8 @@ pub struct Divided {
 }
 
 impl Inner {
-    /// Adds a log to the session with `role`; `None` selects the default role. The log replaces a log with the same path.
+    /// Adds a log to the session with `role`; `None` selects the default role. The log replaces a log with the same path. A test
+    /// flight that was removed unopened is a test flight again: another role would open it without a record.
     pub fn take_in(&mut self, entry: LogEntry, role: Option<Role>, loaded: Arc<Loaded>) {
         let file = self.folder.join(&entry.path);
         let before = self.session.logs.iter().position(|l| self.folder.join(&l.path) == file);
@@ -36,10 +37,19 @@ impl Inner {
         };
         // a log in doubt stays unused until the user gives it a role, unless the user wants such logs
         let refused = loaded.in_doubt() && !self.given.despite_problems;
-        let role = if refused { Role::Unused } else { usual };
+        let removed = self.session.removed_tests.iter().position(|known| *known == entry.sha256);
+        let role = match removed {
+            Some(_) => Role::Test,
+            None if refused => Role::Unused,
+            None => usual,
+        };
+        if let Some(at) = removed {
+            self.session.removed_tests.remove(at);
+        }
         let entry = LogEntry { role, ..entry };
         match before {
             Some(place) => {
+                self.note_removal(place);
                 self.session.logs[place] = entry;
                 self.flights[place] = Ok(loaded);
             }
@@ -48,6 +58,14 @@ impl Inner {
                 self.session.logs.push(entry);
                 self.flights.push(Ok(loaded));
             }
+        }
+    }
+
+    /// Keeps the hash of the log at `place`, which leaves the session, if it is a locked test flight.
+    pub fn note_removal(&mut self, place: usize) {
+        let log = &self.session.logs[place];
+        if self.locked(log) && !self.session.removed_tests.contains(&log.sha256) {
+            self.session.removed_tests.push(log.sha256.clone());
         }
     }
 

@@ -175,6 +175,10 @@ pub struct Session {
     /// Openings of the test flights, in order.
     #[serde(default)]
     pub openings: Vec<Opening>,
+    /// SHA-256 of the test flights that were removed before they were opened. Such a log is a test flight again when it is added
+    /// again, under any name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub removed_tests: Vec<String>,
     /// Ids of effects that the user has written as text; their files are in the folder `effects`.
     #[serde(default)]
     pub own: Vec<String>,
@@ -195,6 +199,7 @@ impl Session {
             effects: Vec::new(),
             undone: Vec::new(),
             openings: Vec::new(),
+            removed_tests: Vec::new(),
             own: Vec::new(),
             flown: Vec::new(),
         }
@@ -314,6 +319,7 @@ mod tests {
             amended: 0.01,
             horizon_s: 5.0,
         });
+        session.removed_tests.push("1".into());
         session.own.push("mine".into());
         session.flown.push(Flown {
             unix_s: 2,

@@ -13,7 +13,7 @@ use greylag::logs::csv;
 type Mistake = (&'static str, i32, &'static [&'static str]);
 
 /// Clap's own, status 2: the command line is wrong and nothing is done.
-const LINE: [Mistake; 12] = [
+const LINE: [Mistake; 14] = [
     ("compare --modle @/model.toml --log @/good.csv", 2, &["--modle", "--model"]),
     ("diagnos --model @/model.toml --log @/good.csv", 2, &["diagnos", "diagnose"]),
     ("compare --model @/model.toml", 2, &["--log"]),
@@ -26,9 +26,11 @@ const LINE: [Mistake; 12] = [
     ("mystery --seed -1 --out @/new", 2, &["-1", "--seed"]),
     ("aircraft new @/new --mass-kg 2.1 --span-m 1.6", 2, &["--area-m2"]),
     ("aircraft new @/new --mass-kg two --span-m 1.6 --area-m2 0.3", 2, &["two", "--mass-kg"]),
+    ("faults --monitor 1 --counterpart px4", 2, &["--monitor", "--counterpart"]),
+    ("faults --scenario @/good.csv --counterpart px4", 2, &["--scenario", "--counterpart"]),
 ];
 
-const FILES: [Mistake; 20] = [
+const FILES: [Mistake; 22] = [
     ("compare --model @/none.toml --log @/good.csv", 1, &["none.toml"]),
     ("compare --model @/model.toml --log @/gone.csv", 1, &["gone.csv", "check the path"]),
     ("compare --model @/model.toml --log @/picture.csv", 1, &["no flight log"]),
@@ -61,6 +63,12 @@ const FILES: [Mistake; 20] = [
         &["no factor", "no mapping was written"],
     ),
     ("workbench --dir @/session", 1, &["needs a model", "greylag workbench --model"]),
+    ("faults --monitor 1 --controller lqi pid-retuned", 1, &["one controller", "--controller"]),
+    (
+        "faults --scenario @/good.csv --controller lqi pid-retuned",
+        1,
+        &["one controller", "--controller"],
+    ),
 ];
 
 const KEPT: [Mistake; 9] = [

@@ -7,7 +7,7 @@ use std::time::Duration;
 use greylag::control::{Controller, Observation, Target};
 use greylag::flight::pilot::{Answers, Config, Decision, Pilot, Plan, Source, TrimPoint};
 use greylag::link::autopilot::{
-    AttitudeSetpoint, Autopilot, Mode, ParameterValue, Sticks, Verdict,
+    AttitudeSetpoint, Autopilot, Mode, ParameterValue, Severity, Sticks, Verdict,
 };
 use greylag::link::vehicle::{
     Authority, Fault, Faults, Order, Profile, Real, Stack, Telemetry, VANE_SD, Vehicle,
@@ -522,6 +522,24 @@ fn a_plan_that_is_no_number_is_replaced_and_told_once_in_five_seconds() {
         Plan::Ready(Command { aileron: 1e30, elevator: -1e30, throttle: 1e30, rudder: 0.0 });
     let decision = flight.fly(1);
     assert_eq!(decision.source, Source::Planned);
+}
+
+#[test]
+fn the_end_of_the_controller_is_told_once_as_critical() {
+    let mut flight = Flight::offboard();
+    flight.plan = Plan::None;
+    assert_eq!(flight.fly(50).source, Source::Fallback);
+    let told: Vec<_> = std::iter::from_fn(|| flight.pilot.take_text())
+        .filter(|text| text.words.contains("controller has ended"))
+        .collect();
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert_eq!(told[0].severity, Severity::Critical);
+    // 10 s later it is not said again.
+    for _ in 0..1000 {
+        flight.pilot.attitude_setpoint(flight.now, LEVEL_SETPOINT);
+        flight.tick();
+    }
+    assert!(!flight.texts().contains("controller has ended"));
 }
 
 #[test]

@@ -155,6 +155,64 @@ fn a_flight_whose_planner_is_busy_at_times_replays_to_the_bit() {
     assert_eq!((outcome.different, outcome.plans_different, outcome.without_state), (0, 0, 0));
 }
 
+/// An LQI that panics at its command number `last` + 1.
+struct Mortal {
+    lqi: Box<dyn Controller>,
+    asked: u32,
+    last: u32,
+}
+
+impl Controller for Mortal {
+    fn boxed_clone(&self) -> Box<dyn Controller> {
+        Box::new(Mortal { lqi: self.lqi.boxed_clone(), ..*self })
+    }
+    fn name(&self) -> &'static str {
+        "mortal"
+    }
+    fn reset(&mut self, seed: u64) {
+        self.lqi.reset(seed);
+    }
+    fn command(&mut self, seen: &Observation, target: &Target) -> greylag::physics::Command {
+        self.asked += 1;
+        assert!(self.asked <= self.last, "the test's own panic");
+        self.lqi.command(seen, target)
+    }
+}
+
+/// After its end the controller is not asked in the replay either. The replayed controller bears one command more: the
+/// answer to the command that ended the flown one may have been late.
+#[test]
+fn a_flight_whose_controller_ends_replays_to_the_bit() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = root.path().join("flight");
+    let staffed = |last: u32, placement: Placement| {
+        let mut companion = companion_with(ControllerKind::Lqi, x8(), Path::new(POLICY)).unwrap();
+        let lqi = companion.controller.boxed_clone();
+        companion.controller = Box::new(Mortal { lqi, asked: 0, last });
+        companion.placement = placement;
+        companion
+    };
+    let record = Some(Place::Exactly(folder.clone()));
+    let options = FlightOptions { record, ..options(Pace::RealTime) };
+    let companion = Companion::with(&options, staffed(60, Placement::Thread));
+    let link = format!("udpout:{}", companion.vehicle());
+    let shim = Shim::start(&link, shim::Pace::RealTime, 600.0, |_| ());
+    let mut client = Client::new(companion.client(0));
+    client.engage(20.0, 5.0);
+    client.steer(20.0, 5.0, 3.0);
+    client.catch_up();
+    shim.end();
+    println!("{}", companion.end());
+    let told = client.texts().join("\n");
+    assert_eq!(told.matches("controller has ended").count(), 1, "{told}");
+    let calls = std::fs::read_to_string(folder.join("flight.calls")).unwrap();
+    assert!(calls.lines().filter(|line| line.ends_with(" none")).count() > 50);
+    let outcome = replay(&folder, staffed(61, Placement::Loop), sitl()).unwrap();
+    println!("{outcome:?}");
+    assert!(outcome.ticks > 100 && !outcome.cut_short, "{outcome:?}");
+    assert_eq!((outcome.different, outcome.plans_different, outcome.without_state), (0, 0, 0));
+}
+
 fn real(personality: Personality, authority: Authority) -> Vehicle {
     Vehicle::Real(Box::new(Real::new(profile(personality, authority))))
 }

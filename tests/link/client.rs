@@ -452,6 +452,19 @@ fn long_texts_come_in_chunks_that_can_be_joined() {
 }
 
 #[test]
+fn a_text_that_is_cut_says_so() {
+    let (mut clients, mut double) = new();
+    clients.handle(at_ms(0), peer(1), &hello(V2), &mut double);
+    // 400 characters are sent whole. Of more, 397 and three dots.
+    for (length, expected) in [(400, "x".repeat(400)), (401, "x".repeat(397) + "...")] {
+        double.texts.push_back(Text { severity: Severity::Error, words: "x".repeat(length) });
+        let seen = run(&mut clients, &mut double, 0, 10);
+        let seen: Vec<_> = seen.into_iter().filter(|s| s.id == 253).collect();
+        assert_eq!(texts(&seen).concat(), expected);
+    }
+}
+
+#[test]
 fn missions_files_time_and_pings_are_answered() {
     let (mut clients, mut double) = new();
     let mut answer = |bytes: &[u8]| ask(&mut clients, &mut double, at_ms(5), 1, bytes);

@@ -68,6 +68,27 @@ fn info_takes_several_logs() {
 }
 
 #[test]
+fn info_goes_on_after_a_log_that_cannot_be_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = put(folder.path(), "good.csv", &csv(&samples(1000)));
+    let broken = put(folder.path(), "broken.csv", b"\x89PNG\r\n\x1a\n0000");
+    let (good, broken) = (good.to_str().unwrap(), broken.to_str().unwrap());
+    let output = greylag(&["info", broken, good]);
+    let (said, failed) = (text(&output.stdout), text(&output.stderr));
+    assert_eq!(output.status.code(), Some(3), "{said}{failed}");
+    assert!(said.contains("good.csv: CSV") && failed.contains("broken.csv"), "{said}{failed}");
+    // two logs were asked for: a list, though one is read
+    let output = greylag(&["info", good, broken, "--json"]);
+    let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((output.status.code(), &found[0]["rows"]), (Some(3), &1000.into()));
+    // none can be read
+    let output = greylag(&["info", broken, "gone.ulg"]);
+    let failed = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{failed}");
+    assert!(failed.contains("broken.csv") && failed.contains("gone.ulg"), "{failed}");
+}
+
+#[test]
 fn info_says_of_a_table_without_a_column_what_it_still_serves_for() {
     let folder = tempfile::tempdir().unwrap();
     let table = text(&csv(&samples(1000)));

@@ -1,5 +1,7 @@
 //! The report of a diagnosis as a file: the story in order, in words as well as in figures, with input made to break it.
 
+use std::collections::BTreeMap;
+
 use crate::report_comparison;
 use crate::report_diagnosis;
 use greylag::report::{DiagnosisReport, Figure, Page};
@@ -15,6 +17,7 @@ fn report<'a>(d: &'a Diagnosis, both: Option<[&'a Comparison; 2]>) -> DiagnosisR
         failing: both.map(|b| b[0]),
         held_out: both.map(|b| b[1]),
         model_file: "prior.toml".into(),
+        effect_files: BTreeMap::from([("lift_alpha2".to_owned(), "effects/mine.toml".to_owned())]),
         log_files: vec!["train-1.csv".into(), "train-2.csv".into(), "train-3.ulg".into()],
         command_line: "greylag diagnose".into(),
         versions: Vec::new(),
@@ -90,7 +93,7 @@ fn who_reads_the_words_alone_misses_nothing() {
         "143, chance 12.4",
         // The look-alike, and what separates the two.
         "Asserted: lift_stall or a look-alike",
-        "greylag design --between lift_stall lift_alpha2",
+        "greylag design --model prior.toml --between lift_stall effects/mine.toml",
         // Why the third is refused; what chance reached; the strongest decoy.
         "refused: the flights disagree",
         "The strongest reached 13.1",

@@ -7,6 +7,7 @@ use std::process::Command;
 use crate::amend_support::{Manoeuvres, errors, fly, sensors};
 use crate::workbench_support::{Bench, MODEL, word};
 use greylag::logs::{Flight, Growing, Sample, csv};
+use greylag::manoeuvres::{CRUISE_MPS, Schedule};
 use greylag::workbench::Order;
 use serde_json::{Value, json};
 
@@ -292,8 +293,10 @@ fn an_order_is_words_that_a_command_line_takes_and_nothing_else() {
         turbulence: Some(3),
         seed: 1,
     };
-    let words =
-        |order: &Order| order.words(folder.path(), Path::new("model.toml"), Path::new("out"));
+    let words_at = |order: &Order, cruise_mps: f64| {
+        order.words(folder.path(), Path::new("model.toml"), cruise_mps, Path::new("out"))
+    };
+    let words = |order: &Order| words_at(order, CRUISE_MPS);
     let said = words(&order("attitudes", "lqi", "x8", "drag_beta2=1 actuator_lag=0.05")).unwrap();
     let said = said.join(" ");
     assert!(said.ends_with("--hide=drag_beta2=1 --hide=actuator_lag=0.05 --turbulence-severity 3 --seed 1 --out out"), "{said}");
@@ -301,7 +304,11 @@ fn an_order_is_words_that_a_command_line_takes_and_nothing_else() {
     // a manoeuvre of the menu becomes a file
     let said = words(&order("elevator-3211", "lqi", "x8", "")).unwrap();
     let at = said.iter().position(|w| w == "--schedule").unwrap();
-    assert!(Path::new(&said[at + 1]).exists());
+    let airspeed = || Schedule::load(Path::new(&said[at + 1])).unwrap().steps()[0].target.airspeed;
+    // for the cruise airspeed of the aircraft
+    let usual = airspeed();
+    words_at(&order("elevator-3211", "lqi", "x8", ""), 2.0 * CRUISE_MPS).unwrap();
+    assert!((airspeed() / usual - 2.0).abs() < 1e-6, "{usual}, then {}", airspeed());
     for wrong in [
         order("attitudes", "lqi", "x8", "--out=/etc/x"),
         order("attitudes", "lqi", "x8", "nothing"),

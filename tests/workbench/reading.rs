@@ -35,3 +35,19 @@ fn a_session_reads_its_logs_as_the_command_line_says() {
     let again = Bench::open(&session, &["--despite-problems"]).state();
     assert_ne!(again["diagnosis"]["key"], state["diagnosis"]["key"]);
 }
+
+#[test]
+fn a_log_of_the_command_line_that_cannot_be_used_is_shown_with_its_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("photo.csv");
+    std::fs::write(&log, b"\x89PNG\r\n\x1a\n0000").unwrap();
+    let session = folder.path().join("session");
+    // at the first start, and at the next one with the same command
+    for _ in 0..2 {
+        let state = Bench::open(&session, &["--model", MODEL, log.to_str().unwrap()]).state();
+        let flights = state["flights"].as_array().unwrap();
+        assert_eq!((flights.len(), &flights[0]["role"]), (1, &json!("unused")), "{state}");
+        let error = flights[0]["error"].as_str().unwrap_or_default();
+        assert!(error.contains("photo.csv") && error.contains("no flight log"), "{state}");
+    }
+}

@@ -398,3 +398,23 @@ fn two_logs_of_one_name_are_two_flights() {
     let _ = child.wait();
     assert!(line.contains("http://127.0.0.1"), "{line}");
 }
+
+#[test]
+fn a_test_flight_that_is_removed_unopened_and_added_again_is_locked() {
+    let scratch = tempfile::tempdir().unwrap();
+    let (session, log) = (scratch.path().join("session"), scratch.path().join("log.csv"));
+    csv::save(&flown(0), &log).unwrap();
+    let log = fs::read(&log).unwrap();
+    let bench = Bench::open(&session, &["--model", MODEL]);
+    assert_eq!(bench.drop_file("test-1.csv", &log).0, 200);
+    assert_eq!(bench.act(json!({ "do": "remove", "flight": 0 })).0, 200);
+    drop(bench);
+    // without its record the first log would be a fit flight
+    let bench = Bench::open(&session, &[]);
+    assert_eq!(bench.drop_file("flight.csv", &log).0, 200);
+    let state = bench.state();
+    let flight = &state["flights"][0];
+    assert_eq!((&flight["role"], &flight["locked"]), (&json!("test"), &json!(true)), "{state}");
+    let (_, state) = bench.act(json!({ "do": "role", "flight": 0, "role": "fit" }));
+    assert_eq!(state["openings"][0]["occasion"], "other_role", "{state}");
+}

@@ -98,7 +98,12 @@ impl Pilot {
                 self.fall_back(seen, Source::Fallback)
             }
             Plan::Late | Plan::Busy => self.fall_back(seen, Source::Late),
-            Plan::None => self.fall_back(seen, Source::Fallback),
+            Plan::None => {
+                if !std::mem::replace(&mut self.complaints.ended, true) {
+                    self.texts.say(Severity::Critical, "controller has ended: fallback flies on");
+                }
+                self.fall_back(seen, Source::Fallback)
+            }
         };
         if let Some(programme) = &mut self.programme {
             command = programme.excite(command);

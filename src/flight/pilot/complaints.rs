@@ -13,11 +13,13 @@ const COMPLAINT_INTERVAL_S: f64 = 5.0;
 /// within 20 ms.
 const LATE_AIR_S: f64 = 0.5;
 
-/// Time of the last report of each kind.
+/// Time of the last report of each kind. The end of the controller is reported once.
 #[derive(Debug, Default)]
 pub(super) struct Complaints {
     pub(super) defect: Option<Time>,
     pub(super) plan: Option<Time>,
+    /// Whether the end of the controller was reported.
+    pub(super) ended: bool,
     pub(super) fallback: Option<Time>,
     pub(super) limits: Option<Time>,
     pub(super) envelope: Option<Time>,

@@ -49,6 +49,8 @@ pub struct Written {
     pub rows: u64,
     /// Number of frames in `flight.tlog`.
     pub frames: u64,
+    /// Frames of messages outside the dialect, which are left out of `flight.tlog`.
+    pub unknown: u64,
     /// Entries dropped because the queue was full or the disk had failed.
     pub dropped: u64,
 }
@@ -96,7 +98,7 @@ impl Recorder {
     }
 
     /// Records one datagram, or complete frames of a stream, sent or received at `unix_us` (µs since 1970). Frames of
-    /// messages outside the dialect are left out.
+    /// messages outside the dialect are left out and counted.
     pub fn bytes(&self, unix_us: u64, bytes: &[u8]) {
         self.queue.hand_over(Entry::Bytes { unix_us, bytes: bytes.into() });
     }
@@ -207,7 +209,8 @@ impl<C: Write, T: Write, L: Write> Files<C, T, L> {
                 self.written.dropped += u64::from(!done);
             }
             Entry::Bytes { unix_us, bytes } => {
-                for frame in Frames::new(bytes, &mut FrameCounts::default()) {
+                let mut counts = FrameCounts::default();
+                for frame in Frames::new(bytes, &mut counts) {
                     let done = self.tlog.attempt(|out| {
                         out.write_all(&unix_us.to_be_bytes())?;
                         out.write_all(frame.bytes)
@@ -215,6 +218,7 @@ impl<C: Write, T: Write, L: Write> Files<C, T, L> {
                     self.written.frames += u64::from(done);
                     self.written.dropped += u64::from(!done);
                 }
+                self.written.unknown += counts.unknown;
             }
         }
     }
@@ -292,11 +296,13 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let recorder = Recorder::start(&Place::Numbered(root.path().to_owned())).unwrap();
         (0..300).for_each(|i| recorder.row(row(i)));
-        let two = [frame(), frame()].concat();
+        // A message id that no dialect has: 0x7F3039.
+        let unknown = [0xFD_u8, 2, 0, 0, 5, 7, 1, 0x39, 0x30, 0x7F, 1, 2, 0, 0];
+        let two = [&frame()[..], &unknown[..], &frame()[..]].concat();
         recorder.bytes(0x0001_0203_0405_0607, &two);
         let folder = recorder.folder().to_owned();
         assert!(folder.ends_with("0001"));
-        assert_eq!(recorder.finish(), Written { rows: 300, frames: 2, dropped: 0 });
+        assert_eq!(recorder.finish(), Written { rows: 300, frames: 2, unknown: 1, dropped: 0 });
         let reading = csv::load(&folder.join("flight.csv"), Tolerance::Strict).unwrap();
         assert_eq!(reading.flight.samples.len(), 300);
         assert_eq!(reading.unknown_columns, Row::EXTRA);

@@ -227,6 +227,9 @@ impl Control {
         if let Some(trouble) = self.recorder.as_ref().and_then(Recorder::trouble) {
             self.pilot.send_text(Severity::Warning, &trouble);
         }
+        if let Some(trouble) = self.ports.trouble() {
+            self.pilot.send_text(Severity::Warning, &trouble);
+        }
         self.take_notices();
         let mut pilot = RecordingAutopilot {
             pilot: &mut self.pilot,

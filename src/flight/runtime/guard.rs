@@ -81,6 +81,11 @@ impl Guard {
         believed
     }
 
+    /// The error of the timestamp file that was not returned yet; `None` without one.
+    pub(super) fn trouble(&self) -> Option<String> {
+        self.file.trouble()
+    }
+
     pub(super) fn counts(&self) -> SigningCounts {
         self.signer.counts()
     }

@@ -65,7 +65,10 @@ impl Ports {
     /// Sends frames to the vehicle.
     pub(super) fn send_to_vehicle(&mut self, unix_us: u64, peer: PeerId, frames: Vec<u8>) {
         let frames = self.signed(unix_us, peer.link, frames);
-        self.vehicle.send(peer, frames);
+        // frames that cannot be signed were removed
+        if !frames.is_empty() {
+            self.vehicle.send(peer, frames);
+        }
     }
 
     /// Sends a frame to a client on the client's link.
@@ -93,8 +96,56 @@ impl Ports {
         }
     }
 
+    /// The error of the signing timestamp's file that was not returned yet; `None` without one.
+    pub(super) fn trouble(&self) -> Option<String> {
+        self.guard.as_ref().and_then(Guard::trouble)
+    }
+
     /// Signing counters; `None` without signing.
     pub(super) fn signing(&self) -> Option<SigningCounts> {
         self.guard.as_ref().map(Guard::counts)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::runtime::guard::{Signing, VehicleLink};
+    use greylag_link::framing::{Source, Version, write};
+    use greylag_link::signing::Key;
+    use greylag_physics::servos::Travels;
+    use std::net::UdpSocket;
+    use std::time::Duration;
+
+    #[test]
+    fn frames_that_cannot_be_signed_leave_no_empty_datagram() {
+        let folder = tempfile::tempdir().unwrap();
+        let key = folder.path().join("key");
+        Key::from_bytes([7; 32]).save(&key).unwrap();
+        let options = FlightOptions {
+            vehicle: "udpin:127.0.0.1:0".parse().unwrap(),
+            clients: vec![],
+            record: None,
+            pace: Pace::RealTime,
+            duration: None,
+            plan_deadline: FlightOptions::PLAN_DEADLINE,
+            travels: Travels::alike(0.4),
+            mixer: None,
+            controller: None,
+            delay_margin: None,
+            signing: Some(Signing { key, vehicle: VehicleLink::Signed, local: vec![] }),
+        };
+        let mut ports = Ports::open(&options).unwrap();
+        let vehicle = UdpSocket::bind("127.0.0.1:0").unwrap();
+        vehicle.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        let peer = PeerId { link: LinkId(0), address: vehicle.local_addr().unwrap() };
+        let source = Source { system: 1, component: 191 };
+        // A MAVLink 1 frame cannot be signed. The first datagram is that of the frame after it.
+        for version in [Version::V1, Version::V2] {
+            let heartbeat = write(version, 0, source, 0, &[0; 9]).unwrap();
+            ports.send_to_vehicle(0, peer, heartbeat);
+        }
+        let mut bytes = [0; 300];
+        assert!(vehicle.recv(&mut bytes).unwrap() > 0);
     }
 }

@@ -128,6 +128,9 @@ impl fmt::Display for Summary {
         self.write_signatures(f)?;
         if let Some((folder, w)) = &self.recording {
             write!(f, "\nrecorded {} rows, {} frames in {}", w.rows, w.frames, folder.display())?;
+            if w.unknown > 0 {
+                write!(f, "; {} frames of unknown messages left out", w.unknown)?;
+            }
             if w.dropped > 0 {
                 write!(f, "; {} dropped", w.dropped)?;
             }

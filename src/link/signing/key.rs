@@ -26,7 +26,7 @@ impl fmt::Debug for Key {
 #[derive(Debug, thiserror::Error)]
 pub enum KeyError {
     /// The file cannot be read.
-    #[error("cannot read key file {}: {why}; make one: greylag link key FILE", path.display())]
+    #[error("cannot read key file {}: {why}; {}", path.display(), read_remedy(.why))]
     Read {
         /// Path of the key file.
         path: PathBuf,
@@ -111,6 +111,17 @@ impl Key {
     }
 }
 
+/// Remedy for a key file that cannot be read.
+fn read_remedy(why: &std::io::Error) -> &'static str {
+    use std::io::ErrorKind;
+    match why.kind() {
+        ErrorKind::NotFound => "make one: greylag link key FILE",
+        ErrorKind::PermissionDenied => "let the file and its folder belong to the user who flies",
+        ErrorKind::IsADirectory => "name the key file, not its folder",
+        _ => "check the file and its disk, or make another key: greylag link key FILE",
+    }
+}
+
 /// Decodes 64 hexadecimal digits.
 fn digits(text: &str) -> Option<[u8; LENGTH]> {
     if text.len() != 2 * LENGTH || !text.bytes().all(|b| b.is_ascii_hexdigit()) {
@@ -182,6 +193,17 @@ mod tests {
             let words = Key::load(&path).unwrap_err().to_string();
             assert!(words.contains("chmod 600") && words.contains(&format!("{mode:o}")), "{words}");
         }
+    }
+
+    #[test]
+    fn a_key_file_is_made_only_where_there_is_none() {
+        let words = |kind: std::io::ErrorKind| {
+            KeyError::Read { path: "key".into(), why: kind.into() }.to_string()
+        };
+        let missing = words(std::io::ErrorKind::NotFound);
+        assert!(missing.contains("make one: greylag link key FILE"), "{missing}");
+        let denied = words(std::io::ErrorKind::PermissionDenied);
+        assert!(!denied.contains("link key") && denied.contains("belong to the user"), "{denied}");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -27,6 +27,16 @@ pub enum StampError {
         /// The operating system's error.
         why: std::io::Error,
     },
+    /// The file is empty.
+    #[error(
+        "{} is empty, perhaps after a power failure: remove it, then choose a new key, because frames that were \
+         signed with this key could be played again",
+        path.display()
+    )]
+    Empty {
+        /// Path of the timestamp file.
+        path: PathBuf,
+    },
     /// The file does not hold a timestamp.
     #[error("{} does not hold a timestamp of signatures: remove it, then choose a new key", path.display())]
     Content {
@@ -39,6 +49,7 @@ pub enum StampError {
 #[derive(Debug)]
 pub struct StampFile {
     shown: Arc<AtomicU64>,
+    troubles: Receiver<String>,
     stop: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -56,6 +67,9 @@ impl StampFile {
         let path = PathBuf::from(name);
         let failed = |why| StampError::File { path: path.clone(), why };
         let last = match fs::read_to_string(&path) {
+            Ok(text) if text.trim().is_empty() => {
+                return Err(StampError::Empty { path: path.clone() });
+            }
             // no signature could be newer than the largest timestamp
             Ok(text) => match text.trim().parse::<u64>() {
                 Ok(last) if last < STAMP_MAX - MARGIN => last,
@@ -68,25 +82,18 @@ impl StampFile {
         write(&path, next).map_err(failed)?;
         let shown = Arc::new(AtomicU64::new(next));
         let (stop, stopped) = channel::<()>();
+        let (trouble, troubles) = channel();
         let (seen, place) = (shown.clone(), path.clone());
         let thread = std::thread::Builder::new()
             .name("stamp".into())
-            .spawn(move || {
-                let mut written = next;
-                loop {
-                    let ends = stopped.recv_timeout(EVERY) != Err(RecvTimeoutError::Timeout);
-                    let now = seen.load(Ordering::Relaxed);
-                    // a disk that is full for a while does no harm: the next write stores the newest timestamp
-                    if now != written && write(&place, now).is_ok() {
-                        written = now;
-                    }
-                    if ends {
-                        return;
-                    }
-                }
-            })
+            .spawn(move || keep(&place, next, &seen, &stopped, &trouble))
             .map_err(failed)?;
-        Ok((StampFile { shown, stop: Some(stop), thread: Some(thread) }, next))
+        Ok((StampFile { shown, troubles, stop: Some(stop), thread: Some(thread) }, next))
+    }
+
+    /// The first error of the thread as text; `None` without an error, and after it was returned.
+    pub fn trouble(&self) -> Option<String> {
+        self.troubles.try_recv().ok()
     }
 
     /// Passes the newest timestamp to the thread, which writes it within a second.
@@ -105,11 +112,47 @@ impl Drop for StampFile {
     }
 }
 
-/// Replaces the file atomically.
+/// Writes the timestamp `seen` to `path` every second until `stopped`. `written` is the timestamp in the file. The first
+/// error is reported to `trouble`.
+fn keep(
+    path: &Path,
+    mut written: u64,
+    seen: &AtomicU64,
+    stopped: &Receiver<()>,
+    trouble: &Sender<String>,
+) {
+    let mut reported = false;
+    loop {
+        let ends = stopped.recv_timeout(EVERY) != Err(RecvTimeoutError::Timeout);
+        let now = seen.load(Ordering::Relaxed);
+        if now != written {
+            match write(path, now) {
+                Ok(()) => written = now,
+                // a disk that is full for a while does no harm: the next write stores the newest timestamp
+                Err(why) if !reported => {
+                    reported = true;
+                    let words = format!(
+                        "{} not written, signed frames may be replayed: {why}",
+                        path.display()
+                    );
+                    // nobody listens after the end of the flight
+                    let _ = trouble.send(words);
+                }
+                Err(_) => {}
+            }
+        }
+        if ends {
+            return;
+        }
+    }
+}
+
+/// Replaces the file atomically. After a power failure it holds the old or the new timestamp.
 fn write(path: &Path, stamp: u64) -> std::io::Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut file = tempfile::NamedTempFile::new_in(folder)?;
     writeln!(file, "{stamp}")?;
+    file.as_file().sync_all()?;
     file.persist(path).map_err(|e| e.error)?;
     Ok(())
 }
@@ -128,6 +171,36 @@ mod tests {
         drop(file);
         let (_file, next) = StampFile::open(&key).unwrap();
         assert_eq!(next, 123_456_789 + MARGIN);
+    }
+
+    #[test]
+    fn a_timestamp_that_cannot_be_written_is_reported_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, _) = StampFile::open(&folder.path().join("key")).unwrap();
+        folder.close().unwrap();
+        file.show(1);
+        let end = std::time::Instant::now() + Duration::from_secs(20);
+        let words = loop {
+            match file.trouble() {
+                Some(words) => break words,
+                None => assert!(std::time::Instant::now() < end, "nothing is reported"),
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        };
+        assert!(words.contains("key.stamp not written"), "{words}");
+        // The next attempt fails as well.
+        file.show(2);
+        std::thread::sleep(EVERY + EVERY / 2);
+        assert_eq!(file.trouble(), None);
+    }
+
+    #[test]
+    fn an_empty_file_is_refused_with_its_cure() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("key.stamp"), "\n").unwrap();
+        let error = StampFile::open(&folder.path().join("key")).unwrap_err();
+        assert!(matches!(error, StampError::Empty { .. }), "{error}");
+        assert!(error.to_string().contains("choose a new key"), "{error}");
     }
 
     #[test]

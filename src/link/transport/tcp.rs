@@ -9,7 +9,7 @@ use std::time::Duration;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::tcp::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::mpsc::{Receiver, Sender, channel};
+use tokio::sync::mpsc::{Receiver, Sender, WeakSender, channel};
 use tokio::time::{sleep, timeout};
 
 use super::{Arrival, Port, count};
@@ -89,14 +89,29 @@ async fn serve(port: Port, connections: Connections, stream: TcpStream, peer: So
     let _ = stream.set_nodelay(true);
     let (reading, writing) = stream.into_split();
     let (queue, frames) = channel(QUEUE);
+    let own = queue.downgrade();
     connections.lock().unwrap_or_else(PoisonError::into_inner).insert(peer, queue);
     port.announce(Arrival::Opened(port.peer(peer))).await;
     tokio::select! {
         () = read(&port, reading, peer) => {}
         () = write(&port, writing, frames) => {}
     }
-    connections.lock().unwrap_or_else(PoisonError::into_inner).remove(&peer);
-    port.announce(Arrival::Closed(port.peer(peer))).await;
+    if remove(&connections, peer, &own) {
+        port.announce(Arrival::Closed(port.peer(peer))).await;
+    }
+}
+
+/// Removes the connection with the queue `own`. Returns `false` if the peer has connected again from the same address:
+/// its new connection stays.
+fn remove(connections: &Connections, peer: SocketAddr, own: &WeakSender<Vec<u8>>) -> bool {
+    let mut connections = connections.lock().unwrap_or_else(PoisonError::into_inner);
+    // a queue that the map no longer holds has no sender left
+    let open = own.upgrade();
+    let own = connections.get(&peer).zip(open).is_some_and(|(held, own)| held.same_channel(&own));
+    if own {
+        connections.remove(&peer);
+    }
+    own
 }
 
 /// Reads chunks and delivers the complete frames.
@@ -149,5 +164,28 @@ async fn dispatch(
             Some(Err(_)) => count(&port.counters.outbox_full),
             None => count(&port.counters.send_failed),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_connection_that_ends_late_leaves_its_successor_open() {
+        let connections = Connections::default();
+        let peer = SocketAddr::from(([127, 0, 0, 1], 14550));
+        let connect = || {
+            let (queue, frames) = channel(1);
+            let own = queue.downgrade();
+            connections.lock().unwrap().insert(peer, queue);
+            (own, frames)
+        };
+        let (first, _first_frames) = connect();
+        let (second, _second_frames) = connect();
+        assert!(!remove(&connections, peer, &first), "the successor was removed");
+        assert_eq!(count_of(&connections), 1);
+        assert!(remove(&connections, peer, &second));
+        assert_eq!(count_of(&connections), 0);
     }
 }

@@ -6,6 +6,8 @@ pub(super) mod proof;
 pub(super) mod suspects;
 pub(super) mod tables;
 
+use std::collections::BTreeMap;
+
 use crate::Page;
 use greylag_sysid::compare::{Answer, Comparison};
 use greylag_sysid::diagnose::Diagnosis;
@@ -26,6 +28,8 @@ pub struct DiagnosisReport<'a> {
     pub held_out: Option<&'a Comparison>,
     /// Path of the model file.
     pub model_file: String,
+    /// Paths, quoted for a shell, of the files of effects that are not in the catalogue, by the effects' ids.
+    pub effect_files: BTreeMap<String, String>,
     /// Paths of the log files, as given.
     pub log_files: Vec<String>,
     /// The command line that ran the diagnosis.

@@ -45,7 +45,7 @@ pub fn diagnosis_page(report: &DiagnosisReport) -> Page {
     sections.push(later);
     sections.push(proof::chance(d));
     sections.extend(report.held_out.map(proof::stated));
-    sections.push(tables::advice(d));
+    sections.push(tables::advice(report));
     sections.push(tables::unseen(d).folded());
     sections.push(tables::tuned(&d.tuned));
     sections.push(tables::measurement(d).folded());

@@ -1,15 +1,25 @@
 //! Tables of a diagnosis: advice, detection limits, coefficients, sensors, trims, candidates, notes, provenance.
 
+use std::path::Path;
+
 use crate::Align::{Left, Right};
 use crate::diagnosis::DiagnosisReport;
 use crate::kit::numbers::{NORMAL_95, evidence, interval, number, percent};
 use crate::{Figure, Finding, Findings, Section, Style, Table, Whisker, Whiskers};
+use greylag_logs::quoted;
 use greylag_sysid::diagnose::{Advice, Candidate, Diagnosis, Tuned};
 
-pub(crate) fn advice(d: &Diagnosis) -> Section {
+pub(crate) fn advice(report: &DiagnosisReport) -> Section {
+    let d = report.diagnosis;
+    let word = |id: &String| report.effect_files.get(id).unwrap_or(id).clone();
     let finding = |a: &Advice| {
         let command = match &a.between {
-            Some([a, b]) => format!(" Its schedule: greylag design --between {a} {b}."),
+            Some([a, b]) => format!(
+                " Its schedule: greylag design --model {} --between {} {}",
+                quoted(Path::new(&report.model_file)),
+                word(a),
+                word(b)
+            ),
             None => String::new(),
         };
         let [manoeuvre, why] = [&a.manoeuvre, &a.why].map(|x| x.trim_end_matches('.'));

@@ -81,17 +81,18 @@ impl Bench {
             return Err(WorkbenchError::NoSimulator);
         }
         self.same_model()?;
-        let (model, folder) = {
+        let (model, cruise_mps, folder) = {
             let inner = self.lock();
             if inner.flying.as_ref().is_some_and(|f| f.on) {
                 return Err(WorkbenchError::Flying);
             }
-            (inner.flying_model(), self.folder.join(FLIGHTS))
+            let cruise_mps = inner.model.airframe.envelope.airspeed_cruise_mps;
+            (inner.flying_model(), cruise_mps, self.folder.join(FLIGHTS))
         };
         std::fs::create_dir_all(&folder).map_err(|e| io(&folder, e))?;
         let number = free(&folder);
         let record = folder.join(number.to_string());
-        let words = order.words(&self.folder, &model, &record)?;
+        let words = order.words(&self.folder, &model, cruise_mps, &record)?;
         let begun = Flown {
             schedule: order.schedule.clone(),
             command: order::line(&words),

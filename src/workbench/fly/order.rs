@@ -90,7 +90,7 @@ pub fn controllers() -> impl Iterator<Item = &'static str> {
 
 impl Order {
     /// Arguments of the command that executes the order with the model file `model` and records to `record`. If the schedule is a
-    /// manoeuvre of the list, its file is first written below the session's folder `folder`.
+    /// manoeuvre of the list, its file is first written below the session's folder `folder`, for the cruise airspeed `cruise_mps`.
     ///
     /// # Errors
     /// `WorkbenchError::Order` if an option is unknown, and an error if the schedule cannot be written.
@@ -98,6 +98,7 @@ impl Order {
         &self,
         folder: &Path,
         model: &Path,
+        cruise_mps: f64,
         record: &Path,
     ) -> Result<Vec<String>, WorkbenchError> {
         ControllerKind::from_str(&self.controller)
@@ -108,7 +109,7 @@ impl Order {
         let text = |path: &Path| path.display().to_string();
         let mut words: Vec<String> = ["demo", "--model"].map(str::to_owned).into();
         words.extend([text(model), "--controller".into(), self.controller.clone()]);
-        if let Some(file) = self.schedule(folder)? {
+        if let Some(file) = self.schedule(folder, cruise_mps)? {
             words.extend(["--schedule".into(), text(&file)]);
         }
         words.extend(["--aircraft".into(), self.aircraft.clone()]);
@@ -130,7 +131,7 @@ impl Order {
     }
 
     /// Path of the schedule file; `None` for the default schedule of the demonstration.
-    fn schedule(&self, folder: &Path) -> Result<Option<PathBuf>, WorkbenchError> {
+    fn schedule(&self, folder: &Path, cruise_mps: f64) -> Result<Option<PathBuf>, WorkbenchError> {
         if self.schedule == ATTITUDES {
             return Ok(None);
         }
@@ -143,7 +144,8 @@ impl Order {
         if let Some(manoeuvre) = menu::named(&self.schedule) {
             let place = file.parent().unwrap_or(folder);
             std::fs::create_dir_all(place).map_err(|e| super::super::error::io(place, e))?;
-            greylag_report::write_over(&file, manoeuvre.schedule().to_toml())?;
+            let schedule = manoeuvre.schedule().at_cruise(cruise_mps);
+            greylag_report::write_over(&file, schedule.to_toml())?;
         }
         if file.exists() { Ok(Some(file)) } else { Err(unknown()) }
     }

@@ -15,6 +15,9 @@ const TRIES: u32 = 5;
 /// Valid pulse widths of a channel, µs.
 pub(super) const PULSE: std::ops::RangeInclusive<f64> = 800.0..=2200.0;
 
+/// Longest text of violations in characters. With what precedes it, it fits into the texts that a client is sent.
+const LONGEST: usize = 330;
+
 /// State of one rule's parameter.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
@@ -120,7 +123,7 @@ impl Parameters {
             .map(|(.., words)| words)
             .chain((1..=3).filter_map(|number| self.disorder(number)))
             .collect();
-        (!bad.is_empty()).then(|| bad.join("; "))
+        (!bad.is_empty()).then(|| joined(&bad))
     }
 
     /// Text about a channel whose RCn_MIN, RCn_TRIM and RCn_MAX are each valid, but not in this order; `None` for a
@@ -139,6 +142,19 @@ impl Parameters {
              calibrate channel {number} again"
         ))
     }
+}
+
+/// The texts in one, the first always, up to [`LONGEST`] characters. The others are counted.
+fn joined(texts: &[String]) -> String {
+    let mut words = String::new();
+    for (at, text) in texts.iter().enumerate() {
+        if at > 0 && words.chars().count() + text.chars().count() > LONGEST {
+            return format!("{words}; and {} more: see `greylag link check`", texts.len() - at);
+        }
+        let between = if at > 0 { "; " } else { "" };
+        words += &format!("{between}{text}");
+    }
+    words
 }
 
 impl Entry {
@@ -255,6 +271,18 @@ mod tests {
         assert!(words.contains("FS_GCS_ENABL is 0: set it to 1 (a radio is bound"), "{words}");
         assert!(words.contains("MAV_GCS_SYSID_HI is 255: set it to 0"), "{words}");
         assert_eq!(answered(|_| None).obstacle(1, true), None);
+    }
+
+    #[test]
+    fn violations_beyond_the_length_of_a_text_are_counted() {
+        let texts: Vec<String> = (0..9).map(|i| format!("{i}").repeat(100)).collect();
+        // 100 + 2 + 100 + 2 + 100 characters; a fourth text would exceed 330
+        let words = joined(&texts);
+        assert!(words.contains(&texts[2]) && !words.contains(&texts[3]), "{words}");
+        assert!(words.ends_with("; and 6 more: see `greylag link check`"), "{words}");
+        assert_eq!(joined(&texts[..3]), texts[..3].join("; "));
+        let long = "x".repeat(500);
+        assert_eq!(joined(std::slice::from_ref(&long)), long);
     }
 
     #[test]
