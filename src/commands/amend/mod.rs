@@ -162,10 +162,12 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 /// The reason why the fit is not written, in a sentence; `None` if it is written. With `--fit-all` no flight is held
-/// out, so an improvement by chance cannot be detected.
+/// out, so an improvement by chance cannot be detected. With `--from-scratch` the model as given is a guess: it is kept
+/// only if a comparison favours it.
 fn given_is_kept(arguments: &Arguments, story: &Amendment) -> Option<String> {
     let by_chance = || story.by_chance().filter(|_| !arguments.fit_all);
-    story.worse().or_else(by_chance).filter(|_| !arguments.accept_anyway)
+    let unjudged = || story.unjudged().filter(|_| !arguments.fit_all && !arguments.from_scratch);
+    story.worse().or_else(by_chance).or_else(unjudged).filter(|_| !arguments.accept_anyway)
 }
 
 /// The next step for the user: a diagnosis of what the amended model still lacks.
