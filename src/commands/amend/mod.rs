@@ -15,7 +15,7 @@ use places::{Places, hashed};
 use tables::print;
 
 use crate::commands::bar::{Bar, shares};
-use crate::commands::distinct::distinct;
+use crate::commands::distinct::{distinct, distinct_names};
 use crate::commands::effect_files::{named_effects, own_effects};
 use crate::commands::files::{self, shipped};
 use crate::commands::given as read;
@@ -114,6 +114,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     let places = Places::new(&path, &model, &arguments.out, overwrite)?;
     distinct(&arguments.logs.paths, &arguments.hold_out)?;
+    if !arguments.per_flight.asked().constants().is_empty() {
+        distinct_names(arguments.logs.paths.iter().chain(&arguments.hold_out))?;
+    }
     let effects = named_effects(&arguments.effects)?;
     check_new(&effects, &model)?;
     let (paths, held) = divided(arguments);
