@@ -142,7 +142,7 @@ mod tests {
     use super::*;
 
     const TEXT: &str = "schema = 1\nname = \"a\"\nseeds = [1, 2, 3]\n[axes]\nkind = [\"x\", \"y\"]\n\
-        [[stage]]\nname = \"first\"\nover = [\"seed\"]\ncommand = \"collect --from INPUT --out {out}\"\n\
+        [[stage]]\nname = \"first\"\nover = [\"seed\"]\ncommand = \"collect --from INPUT --seed {seed} --out {out}\"\n\
         [[stage]]\nname = \"last\"\nover = [\"kind\", \"seed\"]\ncommand = \"evaluate {first} {kind} {first:seed=1}\"\n\
         [[table]]\ntitle = \"t\"\nstage = \"last\"\nrows = [\"kind\"]\nmetrics = [\"easy.mean_deg\"]\n\
         [[claim]]\nsays = \"x is less\"\nmetric = \"easy.mean_deg\"\nless = \"last kind=x\"\nthan = \"last kind=y\"\n";
@@ -214,6 +214,11 @@ mod tests {
         assert_eq!((summary.rows.len(), summary.rows[0].ours.mean.value), (1, 12.0));
         let found = &findings(&planned_first.file, &all.records).unwrap()[0];
         assert_eq!(found.outcome, Outcome::Holds, "{}", found.because);
+        // six cells of one seed tell nothing of the others
+        let mut one = all.records.clone();
+        one.iter_mut().for_each(|record| record.seed = Some(1));
+        let found = &findings(&planned_first.file, &one).unwrap()[0];
+        assert_eq!(found.outcome, Outcome::Undecided, "{}", found.because);
         let found = &findings(&planned_first.file, &all.records[..6]).unwrap()[0];
         assert_eq!(found.outcome, Outcome::NoData);
         assert_eq!(found.because, "no cell of last kind=y has easy.mean_deg");
