@@ -120,13 +120,22 @@ pub fn write_lines<T: serde::Serialize>(path: &Path, lines: &[T]) -> Result<(), 
 ///
 /// # Errors
 ///
-/// If the file cannot be read, or a line is not a valid result.
+/// If the file cannot be read, or a line is not a valid result or has another schema.
 pub fn read_lines(path: &Path) -> Result<Vec<Record>, CampaignError> {
     let text = std::fs::read_to_string(path).map_err(CampaignError::io("cannot read", path))?;
     let line = |(number, line): (usize, &str)| {
-        let wrong =
-            |e| CampaignError::content(path, format!("line {}: is no result: {e}", number + 1));
-        serde_json::from_str(line).map_err(wrong)
+        let wrong = |e: String| {
+            CampaignError::content(path, format!("line {}: is no result: {e}", number + 1))
+        };
+        let record: Record = serde_json::from_str(line).map_err(|e| wrong(e.to_string()))?;
+        match record.schema == Record::SCHEMA {
+            true => Ok(record),
+            false => Err(wrong(format!(
+                "its schema is {:?}, and this program reads {}",
+                record.schema,
+                Record::SCHEMA
+            ))),
+        }
     };
     text.lines().enumerate().map(line).collect()
 }
@@ -257,5 +266,12 @@ mod tests {
         let path = folder.path().join("a.jsonl");
         std::fs::write(&path, "{}\n").unwrap();
         assert!(read_lines(&path).unwrap_err().to_string().contains("line 1: is no result"));
+        let line = r#"{"schema":"greylag.cell/2","campaign":"a","cell":"c","stage":"s","levels":{},"seed":1,"identity":"",
+            "program":"","command":"","inputs":{},"files":{},"metrics":{}}"#;
+        std::fs::write(&path, line.replace('\n', "")).unwrap();
+        let why = read_lines(&path).unwrap_err().to_string();
+        assert!(why.contains("line 1: is no result: its schema is \"greylag.cell/2\""), "{why}");
+        std::fs::write(&path, line.replace('\n', "").replace("cell/2", "cell/1")).unwrap();
+        assert_eq!(read_lines(&path).unwrap().len(), 1);
     }
 }
