@@ -180,6 +180,8 @@ pub struct Rule {
     pub note: Option<String>,
     /// Whether the airspeed is equivalent airspeed, to be converted to true airspeed with the density.
     pub equivalent: bool,
+    /// Whether the user's mapping names it.
+    pub own: bool,
 }
 
 /// Gas constant of dry air, J/(kg K).
@@ -194,6 +196,7 @@ impl Rule {
             fill,
             note: None,
             equivalent: false,
+            own: false,
         }
     }
 
@@ -262,6 +265,11 @@ impl Rule {
     /// The rule with its airspeed taken as equivalent airspeed.
     pub fn equivalent(self) -> Rule {
         Rule { equivalent: true, ..self }
+    }
+
+    /// The rule as one of the user's mapping.
+    pub fn own(self) -> Rule {
+        Rule { own: true, ..self }
     }
 
     /// The columns that it fills.
