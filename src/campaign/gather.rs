@@ -120,13 +120,22 @@ pub fn write_lines<T: serde::Serialize>(path: &Path, lines: &[T]) -> Result<(), 
 ///
 /// # Errors
 ///
-/// If the file cannot be read, or a line is not a valid result.
+/// If the file cannot be read, or a line is not a valid result or has another schema.
 pub fn read_lines(path: &Path) -> Result<Vec<Record>, CampaignError> {
     let text = std::fs::read_to_string(path).map_err(CampaignError::io("cannot read", path))?;
     let line = |(number, line): (usize, &str)| {
-        let wrong =
-            |e| CampaignError::content(path, format!("line {}: is no result: {e}", number + 1));
-        serde_json::from_str(line).map_err(wrong)
+        let wrong = |e: String| {
+            CampaignError::content(path, format!("line {}: is no result: {e}", number + 1))
+        };
+        let record: Record = serde_json::from_str(line).map_err(|e| wrong(e.to_string()))?;
+        match record.schema == Record::SCHEMA {
+            true => Ok(record),
+            false => Err(wrong(format!(
+                "its schema is {:?}, and this program reads {}",
+                record.schema,
+                Record::SCHEMA
+            ))),
+        }
     };
     text.lines().enumerate().map(line).collect()
 }
@@ -142,7 +151,7 @@ mod tests {
     use super::*;
 
     const TEXT: &str = "schema = 1\nname = \"a\"\nseeds = [1, 2, 3]\n[axes]\nkind = [\"x\", \"y\"]\n\
-        [[stage]]\nname = \"first\"\nover = [\"seed\"]\ncommand = \"collect --from INPUT --out {out}\"\n\
+        [[stage]]\nname = \"first\"\nover = [\"seed\"]\ncommand = \"collect --from INPUT --seed {seed} --out {out}\"\n\
         [[stage]]\nname = \"last\"\nover = [\"kind\", \"seed\"]\ncommand = \"evaluate {first} {kind} {first:seed=1}\"\n\
         [[table]]\ntitle = \"t\"\nstage = \"last\"\nrows = [\"kind\"]\nmetrics = [\"easy.mean_deg\"]\n\
         [[claim]]\nsays = \"x is less\"\nmetric = \"easy.mean_deg\"\nless = \"last kind=x\"\nthan = \"last kind=y\"\n";
@@ -214,6 +223,11 @@ mod tests {
         assert_eq!((summary.rows.len(), summary.rows[0].ours.mean.value), (1, 12.0));
         let found = &findings(&planned_first.file, &all.records).unwrap()[0];
         assert_eq!(found.outcome, Outcome::Holds, "{}", found.because);
+        // six cells of one seed tell nothing of the others
+        let mut one = all.records.clone();
+        one.iter_mut().for_each(|record| record.seed = Some(1));
+        let found = &findings(&planned_first.file, &one).unwrap()[0];
+        assert_eq!(found.outcome, Outcome::Undecided, "{}", found.because);
         let found = &findings(&planned_first.file, &all.records[..6]).unwrap()[0];
         assert_eq!(found.outcome, Outcome::NoData);
         assert_eq!(found.because, "no cell of last kind=y has easy.mean_deg");
@@ -252,5 +266,12 @@ mod tests {
         let path = folder.path().join("a.jsonl");
         std::fs::write(&path, "{}\n").unwrap();
         assert!(read_lines(&path).unwrap_err().to_string().contains("line 1: is no result"));
+        let line = r#"{"schema":"greylag.cell/2","campaign":"a","cell":"c","stage":"s","levels":{},"seed":1,"identity":"",
+            "program":"","command":"","inputs":{},"files":{},"metrics":{}}"#;
+        std::fs::write(&path, line.replace('\n', "")).unwrap();
+        let why = read_lines(&path).unwrap_err().to_string();
+        assert!(why.contains("line 1: is no result: its schema is \"greylag.cell/2\""), "{why}");
+        std::fs::write(&path, line.replace('\n', "").replace("cell/2", "cell/1")).unwrap();
+        assert_eq!(read_lines(&path).unwrap().len(), 1);
     }
 }

@@ -25,7 +25,8 @@ pub struct Plan {
 ///
 /// # Errors
 ///
-/// If a command has an unknown placeholder, or names a file that does not exist or cannot be read.
+/// If a command has an unknown placeholder, or names a file that does not exist or cannot be read, or if two cells of a stage
+/// have the same command.
 pub fn plan(
     file: CampaignFile,
     path: &Path,
@@ -48,10 +49,25 @@ pub fn plan(
                 }
                 inputs.insert(name.clone(), hashes[&name].clone());
             }
-            cells.push(cell(cells.len() + 1, stage, &levels, words, inputs, after));
+            let new = cell(cells.len() + 1, stage, &levels, words, inputs, after);
+            distinct(&cells, &new).map_err(about)?;
+            cells.push(new);
         }
     }
     Ok(Plan { file, cells })
+}
+
+/// Checks that no other cell of the stage has the command and the inputs of `new`: copies of one result would count as several
+/// seeds or levels.
+fn distinct(cells: &[Cell], new: &Cell) -> Result<(), String> {
+    let same = |cell: &&Cell| cell.stage == new.stage && cell.identity == new.identity;
+    match cells.iter().find(same) {
+        Some(old) => Err(format!(
+            "cells {} and {} have the same command; write {{AXIS}} into it for every axis that it varies, such as {{seed}}",
+            old.id, new.id
+        )),
+        None => Ok(()),
+    }
 }
 
 impl Plan {
@@ -229,6 +245,20 @@ fn content(path: &Path) -> Result<String, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_stage_whose_command_leaves_out_an_axis_is_refused() {
+        let text = "schema = 1\nname = \"a\"\nseeds = [1, 2]\n[axes]\nkind = [\"x\"]\n\
+            [[stage]]\nname = \"first\"\nover = [\"seed\"]\ncommand = \"collect --out {out}\"\n";
+        let planned = |text: &str| {
+            let file = CampaignFile::parse(text).unwrap();
+            plan(file, Path::new("a.toml"), &|path: &Path| PathBuf::from(path))
+        };
+        let why = planned(text).unwrap_err().to_string();
+        assert!(why.contains("cells first/1 and first/2 have the same command"), "{why}");
+        let seeded = planned(&text.replace("--out", "--seed {seed} --out")).unwrap();
+        assert_eq!(seeded.cells.len(), 2);
+    }
 
     #[test]
     fn a_level_that_an_earlier_stage_does_not_vary_is_refused() {

@@ -64,7 +64,7 @@ pub enum Outcome {
     Holds,
     /// Refuted: the 95 % interval of the difference is below zero.
     Contradicted,
-    /// Undecided: the 95 % interval of the difference contains zero, or one side has fewer than three cells.
+    /// Undecided: the 95 % interval of the difference contains zero, or one side has fewer than three seeds.
     Undecided,
     /// Not tested: one side has no cell with the quantity.
     NoData,
@@ -143,12 +143,13 @@ fn row(
     Some(SummaryRow { name, metric: metric.into(), ours, runs, paper })
 }
 
-/// Least number of runs for which an interval over seeds is used. A single run has no spread.
+/// Least number of seeds for which an interval over seeds is used. The runs of one seed have no spread over seeds, however
+/// many they are.
 const FEWEST: usize = 3;
 
 impl Summary {
     /// One sentence for each row whose 95 % interval of the mean is disjoint from the published interval. Rows with
-    /// fewer than three runs are omitted.
+    /// fewer than three seeds are omitted.
     pub fn departures(&self) -> Vec<String> {
         self.rows.iter().filter_map(SummaryRow::departure).collect()
     }
@@ -156,7 +157,7 @@ impl Summary {
 
 impl SummaryRow {
     fn departure(&self) -> Option<String> {
-        if self.ours.count < FEWEST {
+        if self.runs.iter().map(|run| run.seed).collect::<BTreeSet<_>>().len() < FEWEST {
             return None;
         }
         let (ours, theirs) = (self.ours.mean, self.paper[2]?);
@@ -203,6 +204,12 @@ fn finding(file: &CampaignFile, claim: &ClaimFile, records: &[Record]) -> Result
         cells.filter_map(of).collect()
     };
     let (less, than) = (side(&stage_a, &levels_a), side(&stage_b, &levels_b));
+    let seeds = |stage: &str, levels: &BTreeMap<String, String>| {
+        let cells = records.iter().filter(|r| r.has(stage, levels));
+        let cells = cells.filter(|r| r.metrics.contains_key(&claim.metric));
+        cells.map(|r| r.seed).collect::<BTreeSet<_>>().len()
+    };
+    let fewest = seeds(&stage_a, &levels_a).min(seeds(&stage_b, &levels_b));
     let says = claim.says.clone();
     let values = |of: &[(Levels, f64)]| of.iter().map(|(_, v)| *v).collect::<Vec<_>>();
     let (a, b) = (values(&less), values(&than));
@@ -217,7 +224,7 @@ fn finding(file: &CampaignFile, claim: &ClaimFile, records: &[Record]) -> Result
         return Ok(Finding { says, outcome: Outcome::NoData, because });
     };
     let outcome = match gap.ci95 {
-        _ if a.len().min(b.len()) < FEWEST => Outcome::Undecided,
+        _ if fewest < FEWEST => Outcome::Undecided,
         [low, _] if low > 0.0 => Outcome::Holds,
         [_, high] if high < 0.0 => Outcome::Contradicted,
         _ => Outcome::Undecided,
@@ -266,6 +273,21 @@ mod tests {
 
     fn cell(prior: &str, seed: u64) -> Levels {
         [("prior", prior.to_owned()), (SEED, seed.to_string())].map(|(a, l)| (a.into(), l)).into()
+    }
+
+    /// Three cells of one seed differ by prior, not by chance.
+    #[test]
+    fn many_cells_of_few_seeds_do_not_depart_from_the_paper() {
+        let run = |k: u64, seed: u64| Run { cell: k.to_string(), seed: Some(seed), value: 1.0 };
+        let row = |seeds: [u64; 3]| SummaryRow {
+            name: "x".into(),
+            metric: "easy.mean_deg".into(),
+            ours: aggregate(&[vec![1.0; 3]]).unwrap(),
+            runs: seeds.into_iter().enumerate().map(|(k, seed)| run(k as u64, seed)).collect(),
+            paper: [None, None, Some(Estimate { value: 3.0, ci95: [2.0, 4.0] })],
+        };
+        assert_eq!(row([1, 1, 2]).departure(), None);
+        assert!(row([1, 2, 3]).departure().is_some());
     }
 
     /// Seeds differ by 10 and the two sides by 1. Only the paired test can detect the difference.

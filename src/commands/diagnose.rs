@@ -152,6 +152,7 @@ fn next(
     let between = diagnosis.advice.iter().find_map(|a| a.between.as_ref());
     match (diagnosis.verdict, between) {
         (Verdict::Effect, Some(pair)) if in_doubt(diagnosis) => design(&model, pair, words),
+        (Verdict::Effect, _) if only_axes(alike(diagnosis)) => turned(&model, &logs, &out),
         (Verdict::Effect, _) => format!("greylag amend --model {model}{logs} --accept --out {out}"),
         (Verdict::Adequate, _) if change_percent > -WORTH_TUNING => {
             format!("greylag aircraft check --model {model}")
@@ -177,9 +178,25 @@ fn design(model: &str, pair: &[String; 2], words: &BTreeMap<String, String>) -> 
     format!("greylag design --model {model} --between {a} {b}")
 }
 
+/// The command that fits misaligned axes in place of an effect that cannot be told from them.
+fn turned(model: &str, logs: &str, out: &str) -> String {
+    format!("greylag amend --model {model}{logs} --tune-only --axes-askew 3 --out {out}")
+}
+
 /// Whether an asserted effect could be another one as well.
 fn in_doubt(diagnosis: &Diagnosis) -> bool {
-    diagnosis.effects.iter().any(|c| c.asserted && !c.indistinguishable_from.is_empty())
+    alike(diagnosis).next().is_some()
+}
+
+/// What the asserted effects cannot be told from.
+fn alike(diagnosis: &Diagnosis) -> impl Iterator<Item = &String> {
+    diagnosis.effects.iter().filter(|c| c.asserted).flat_map(|c| &c.indistinguishable_from)
+}
+
+/// Whether misaligned axes are all that `alike` names.
+fn only_axes<'a>(alike: impl Iterator<Item = &'a String>) -> bool {
+    let mut alike = alike.peekable();
+    alike.peek().is_some() && alike.all(|id| id == askew::ID)
 }
 
 /// The report as HTML, with the errors of the models by channel and regime.
@@ -268,13 +285,18 @@ fn channels(diagnosis: &Diagnosis) -> Table {
     for c in &diagnosis.channels {
         table.add_row([
             c.channel.clone(),
-            format!("{:.3} %", 100.0 * c.tuned_unexplained_fraction),
-            format!("{:.3} %", 100.0 * c.unexplained_fraction),
+            share(c.tuned_unexplained_fraction),
+            share(c.unexplained_fraction),
             c.left_with.clone().unwrap_or("–".into()),
             c.worst_regime.clone().unwrap_or("–".into()),
         ]);
     }
     table
+}
+
+/// A share in percent; a dash for an unknown share.
+fn share(x: f64) -> String {
+    if x.is_finite() { format!("{:.3} %", 100.0 * x) } else { "–".into() }
 }
 
 /// Table of the constants estimated for each flight; `None` if none were requested.
@@ -322,11 +344,29 @@ mod tests {
     #[test]
     fn the_command_that_comes_next_is_whole() {
         let files = BTreeMap::from([("mine".to_owned(), "effects/mine.toml".to_owned())]);
+        let words = |line: &str| -> Vec<std::ffi::OsString> {
+            line.split(' ').skip(1).map(std::ffi::OsString::from).collect()
+        };
         for (second, named) in [("lift_alpha2", "lift_alpha2"), ("mine", "effects/mine.toml")] {
             let line = design("model.toml", &["lift_stall", second].map(String::from), &files);
             assert!(line.ends_with(&format!(" --between lift_stall {named}")), "{line}");
-            let words: Vec<_> = line.split(' ').skip(1).map(std::ffi::OsString::from).collect();
-            assert!(matches!(command_of(&words), Ok(Command::Design(_))), "{line}");
+            assert!(matches!(command_of(&words(&line)), Ok(Command::Design(_))), "{line}");
         }
+        let line = turned("model.toml", " --log a.csv", "amended");
+        assert!(matches!(command_of(&words(&line)), Ok(Command::Amend(_))), "{line}");
+    }
+
+    #[test]
+    fn axes_are_fitted_if_they_are_all_that_an_effect_cannot_be_told_from() {
+        let only = |ids: &[&str]| {
+            only_axes(ids.iter().map(|id| (*id).to_owned()).collect::<Vec<_>>().iter())
+        };
+        assert!(only(&[askew::ID]) && only(&[askew::ID, askew::ID]));
+        assert!(!only(&[]) && !only(&[askew::ID, "inertia"]));
+    }
+
+    #[test]
+    fn an_unknown_share_is_a_dash() {
+        assert_eq!([0.012_34, f64::NAN].map(share), ["1.234 %", "–"]);
     }
 }

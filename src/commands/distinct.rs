@@ -36,6 +36,26 @@ pub fn distinct(fitted: &[PathBuf], held: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
+/// Refuses two of `logs` that have the same file name, for constants of each flight: the model's file keeps them by the names of
+/// the logs, so one flight would have those of the other.
+///
+/// # Errors
+/// If two logs have the same file name. The error names both.
+pub fn distinct_names<'a>(logs: impl Iterator<Item = &'a PathBuf>) -> Result<()> {
+    let mut known: Vec<&Path> = Vec::new();
+    for log in logs {
+        if let Some(other) = known.iter().find(|other| other.file_name() == log.file_name()) {
+            bail!(
+                "{} and {} have the same name, by which the model's file keeps the trims and axes of a flight; rename one of them",
+                other.display(),
+                log.display()
+            );
+        }
+        known.push(log);
+    }
+    Ok(())
+}
+
 fn named<'a>(all: &'a [(PathBuf, String)], content: &str) -> Option<&'a Path> {
     all.iter().find(|(_, other)| other == content).map(|(path, _)| path.as_path())
 }
@@ -47,6 +67,14 @@ fn same(one: &Path, other: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn logs_of_one_name_in_two_folders_are_refused() {
+        let logs = ["one/flight.csv", "one/other.csv", "two/flight.csv"].map(PathBuf::from);
+        distinct_names(logs[..2].iter()).unwrap();
+        let why = distinct_names(logs.iter()).unwrap_err().to_string();
+        assert!(why.starts_with("one/flight.csv and two/flight.csv have the same name"), "{why}");
+    }
 
     #[test]
     fn a_flight_is_known_by_its_content() {

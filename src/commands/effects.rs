@@ -312,7 +312,6 @@ fn example(model: &GreyBox, about: &Description) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::commands::command_of;
 
     #[test]

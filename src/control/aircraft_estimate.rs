@@ -3,6 +3,8 @@
 //! Equation error in the time domain (E. A. Morelli, V. Klein, "Aircraft System Identification", 2nd ed., 2016, chapter 5) by
 //! recursive least squares with a prior: ω̇ is a sum of terms, each a coefficient times a measured quantity. Both sides are
 //! differentiated and pass the same low-pass filters. The differentiation removes constant and slow influences (trim, wind).
+//! A delay between measured and effective deflections is unknown: regressions with several delays run in parallel, and the one
+//! with the smallest error counts.
 //!
 //! The estimator needs no model, and no command depends on it. Its estimates are for display and for the flight's summary.
 
@@ -25,6 +27,12 @@ const PRIORS: [[[f64; TERMS]; 2]; 2] = [
 const CORNER: f64 = 10.0;
 /// Standard deviation of the regression's error, 1/s². Its product with V/g (s) has the unit of the regression's left side.
 const NOISE: f64 = 4.0;
+/// Delays of the controls that are tried, in samples.
+const DELAYS: [usize; 4] = [0, 2, 4, 6];
+/// Largest delay, in samples.
+const LONGEST: usize = 6;
+/// Time constant of the mean square error that compares the delays, s.
+const FORGETTING_S: f64 = 20.0;
 /// Growth rate of each variance by forgetting, as a fraction of the prior variance, 1/s.
 const AGEING: f64 = 1e-4;
 /// Accepted sample intervals, s.
@@ -42,16 +50,21 @@ pub struct AircraftEstimator {
     cruise: f64,
     /// Full travel of aileron, elevator and rudder, rad; infinite for an aircraft without a rudder.
     travel: [f64; 3],
-    axes: [Axis; 2],
+    /// Regressions of roll and pitch, one for each of [`DELAYS`].
+    axes: [[Axis; DELAYS.len()]; 2],
+    /// Controls over their travels, the newest first.
+    controls: [[f64; 4]; LONGEST + 1],
     last: Option<Time>,
 }
 
-/// The regression of one axis.
+/// The regression of one axis with one delay.
 #[derive(Clone, Debug)]
 struct Axis {
     prior_sd: [f64; TERMS],
     theta: [f64; TERMS],
     covariance: [[f64; TERMS]; TERMS],
+    /// Low-passed square of the error before each update.
+    error: f64,
     /// Filters of the rate and of the terms; `None` before the first sample and after an interruption.
     filters: Option<[Filter; TERMS + 1]>,
 }
@@ -64,11 +77,10 @@ struct Filter {
 }
 
 impl Filter {
-    /// The filtered derivative after a further sample `x`, `step` seconds after the previous one.
-    fn next(&mut self, x: f64, step: f64) -> f64 {
+    /// Takes a further sample `x`, `step` seconds after the previous one.
+    fn take(&mut self, x: f64, step: f64) {
         self.low += step * CORNER * (x - self.low);
         self.slope += step * CORNER * (CORNER * (x - self.low) - self.slope);
-        self.slope
     }
 }
 
@@ -76,7 +88,7 @@ impl Axis {
     fn new([mean, sd]: [[f64; TERMS]; 2]) -> Axis {
         let mut covariance = [[0.0; TERMS]; TERMS];
         (0..TERMS).for_each(|k| covariance[k][k] = sd[k] * sd[k]);
-        Axis { prior_sd: sd, theta: mean, covariance, filters: None }
+        Axis { prior_sd: sd, theta: mean, covariance, error: 0.0, filters: None }
     }
 
     /// Updates with the rate and the terms of one sample. `time` is V/g at the cruise airspeed, s.
@@ -90,7 +102,7 @@ impl Axis {
             return self.filters = Some(signals.map(|low| Filter { low, slope: 0.0 }));
         };
         let before = filters.map(|filter| filter.slope);
-        filters.iter_mut().zip(signals).for_each(|(filter, x)| drop(filter.next(x, step)));
+        filters.iter_mut().zip(signals).for_each(|(filter, x)| filter.take(x, step));
         // the difference of two rates is the acceleration in the middle between them
         let x = std::array::from_fn(|k| 0.5 * (filters[k + 1].slope + before[k + 1]));
         let y = (filters[0].slope - before[0]) / step * time * time;
@@ -103,6 +115,7 @@ impl Axis {
         let spread: [f64; TERMS] = std::array::from_fn(|k| dot(&self.covariance[k]));
         let variance = dot(&spread) + noise * noise;
         let error = y - dot(&self.theta);
+        self.error += step / FORGETTING_S * (error * error - self.error);
         for i in 0..TERMS {
             self.theta[i] += spread[i] * error / variance;
             for j in 0..TERMS {
@@ -163,7 +176,8 @@ impl AircraftEstimator {
                 surfaces.elevator.travel.smallest(),
                 rudder,
             ],
-            axes: PRIORS.map(Axis::new),
+            axes: PRIORS.map(|prior| std::array::from_fn(|_| Axis::new(prior))),
+            controls: [[f64::NAN; 4]; LONGEST + 1],
             last: None,
         }
     }
@@ -179,20 +193,30 @@ impl AircraftEstimator {
         }
         let scale = self.cruise / STANDARD_GRAVITY;
         let [aileron, elevator, rudder] = self.travel;
-        let controls = [
+        self.controls.rotate_right(1);
+        self.controls[0] = [
             actuators.aileron / aileron,
             actuators.elevator / elevator,
             actuators.rudder / rudder,
             actuators.throttle,
         ];
-        let [roll, pitch] = terms(state, controls, speed, scale);
-        self.axes[0].see(state.p, &roll, scale, step);
-        self.axes[1].see(state.q, &pitch, scale, step);
+        for (k, delay) in DELAYS.into_iter().enumerate() {
+            let [roll, pitch] = terms(state, self.controls[delay], speed, scale);
+            self.axes[0][k].see(state.p, &roll, scale, step);
+            self.axes[1][k].see(state.q, &pitch, scale, step);
+        }
     }
 
     /// Restarts the filters, for instance when the deflections are unknown for a while. The estimates remain.
     pub fn interrupt(&mut self) {
-        self.axes.iter_mut().for_each(|axis| axis.filters = None);
+        self.axes.iter_mut().flatten().for_each(|axis| axis.filters = None);
+        self.controls = [[f64::NAN; 4]; LONGEST + 1];
+    }
+
+    /// The regression of axis 0 (roll) or 1 (pitch) with the delay that explains the flight best.
+    fn best(&self, axis: usize) -> &Axis {
+        let all = &self.axes[axis];
+        all.iter().min_by(|a, b| a.error.total_cmp(&b.error)).unwrap_or(&all[0])
     }
 
     /// The dimensional derivatives at the cruise airspeed, in the order of [`DERIVATIVES`]: L_δa and M_δe in rad/s² at full
@@ -200,7 +224,7 @@ impl AircraftEstimator {
     /// estimate is above 0.3 of the prior's.
     pub fn derivatives(&self) -> [f64; DERIVATIVES.len()] {
         let time = self.cruise / STANDARD_GRAVITY;
-        let [roll, pitch] = &self.axes;
+        let [roll, pitch] = [self.best(0), self.best(1)];
         [
             roll.known(0) / (time * time),
             -roll.known(1) / time,

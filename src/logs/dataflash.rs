@@ -17,7 +17,7 @@ use std::io::Read;
 use super::finding::Finding;
 use super::format::DATAFLASH_MAGIC;
 use super::stretches::Keep;
-use super::topics::{Topic, Topics};
+use super::topics::{MOST_FLIGHTS, Topic, Topics, too_many};
 use super::ulog::damage;
 use super::window::Window;
 
@@ -150,6 +150,8 @@ struct Reader {
     out: Topics,
     /// The flights before the present one.
     lives: Vec<Topics>,
+    /// Whether a flight beyond the most that are read has begun.
+    full: bool,
     /// Number of bytes that belong to no record, and the time that is lost at each such place, s.
     skipped: usize,
     holes: Vec<f64>,
@@ -258,7 +260,13 @@ impl Reader {
         let goes_back = last.is_some_and(|last| time_s < last - BACK_S)
             && earlier.is_none_or(|earlier| time_s <= earlier);
         if declared.role == Role::Clock && goes_back {
-            self.another_life();
+            self.full |= self.lives.len() + 1 >= MOST_FLIGHTS;
+            if !self.full {
+                self.another_life();
+            }
+        }
+        if self.full {
+            return;
         }
         self.sample(kind, place, time_s, body);
     }
@@ -303,6 +311,9 @@ impl Reader {
         }
         self.out.topics = self.gathered();
         self.out.findings.extend(damage(self.skipped, &self.holes));
+        if self.full {
+            self.out.findings.push(too_many());
+        }
         // The card's last block is padded, so that a cut record at the end is the rule.
         if cut > 0 {
             self.out.findings.push(Finding::warning(format!(
@@ -370,5 +381,19 @@ mod tests {
         };
         assert_eq!(flights(&[9_000_000, 9_020_000, 20_000, 40_000]), 2);
         assert_eq!(flights(&[1_000_000, 1_020_000, 9_000_000_000, 1_040_000, 1_060_000]), 1);
+    }
+
+    #[test]
+    fn a_damaged_file_does_not_hold_thousands_of_flights() {
+        let bytes = log(&[1_000_000_u64, 9_000_000].repeat(MOST_FLIGHTS + 50));
+        let mut source = &bytes[..];
+        let (lives, _) = read(&mut source, &|_| true, Keep::All);
+        assert_eq!(lives.len(), MOST_FLIGHTS);
+        let said = |life: &Topics| life.findings.contains(&too_many());
+        assert!(lives.iter().all(said) && lives.iter().all(|life| life.topics.len() == 1));
+        let bytes = log(&[1_000_000_u64, 9_000_000].repeat(MOST_FLIGHTS));
+        let mut source = &bytes[..];
+        let (lives, _) = read(&mut source, &|_| true, Keep::All);
+        assert!(lives.len() == MOST_FLIGHTS && !lives.iter().any(said));
     }
 }

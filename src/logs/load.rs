@@ -252,11 +252,19 @@ fn read(
     }
     let wanted = |topic: &str| options.mapping.wants(format, topic);
     let fields = |topic: &str, field: &str| options.mapping.wants_field(format, topic, field);
+    let narrow;
+    let mut decoded;
     let mut text_log;
     let (lives, window): (Vec<Topics>, _) = match format {
         Format::Ulog => {
             let (topics, window) = ulog::read(&mut source, &fields, keep);
             (vec![topics], window)
+        }
+        Format::Dataflash if door::is_wide(start) => {
+            narrow = decode(source).map_err(failed)?;
+            decoded = &narrow[..];
+            text_log = Binary::new(&mut decoded);
+            dataflash::read(&mut text_log, &wanted, keep)
         }
         Format::Dataflash if !start.starts_with(&DATAFLASH_MAGIC) => {
             text_log = Binary::new(&mut source);
@@ -299,11 +307,16 @@ fn table(
     if !door::is_wide(start) {
         return text::read(&mut BufReader::with_capacity(BUFFER, source), path, options, to, keep);
     }
-    let mut bytes = Vec::new();
     let failed = |source| LogError::File { path: path.to_owned(), source };
-    source.read_to_end(&mut bytes).map_err(failed)?;
-    let bytes = door::narrowed(&bytes).unwrap_or(bytes);
+    let bytes = decode(source).map_err(failed)?;
     text::read(&mut &bytes[..], path, options, to, keep)
+}
+
+/// The text of `source`, which is in UTF-16, in UTF-8.
+fn decode(source: &mut dyn Read) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    source.read_to_end(&mut bytes)?;
+    Ok(door::narrowed(&bytes).unwrap_or(bytes))
 }
 
 /// The name of a file.
@@ -326,4 +339,26 @@ pub(super) fn dropped(count: usize, numbers: &[usize]) -> Option<Finding> {
             "{count} rows dropped as out of order, repeated, incomplete or impossible (rows {list}{more})"
         ))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dataflash_text_in_utf_16_is_read_as_in_utf_8() {
+        let text = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
+            FMT, 7, 15, ATT, Qf, TimeUS,Roll\nATT, 1000000, 1.5\nATT, 1020000, 1.6\n";
+        let wide: Vec<u8> = "\u{feff}"
+            .encode_utf16()
+            .chain(text.encode_utf16())
+            .flat_map(u16::to_le_bytes)
+            .collect();
+        let lacks = |bytes: &[u8]| {
+            parse(bytes, Path::new("a.log"), &Options::default()).unwrap_err().to_string()
+        };
+        let said = lacks(text.as_bytes());
+        assert!(said.contains("the file holds ATT"), "{said}");
+        assert_eq!(lacks(&wide), said);
+    }
 }

@@ -46,7 +46,7 @@ impl<'a> Reader<'a> {
                 let column = rule.columns()[0];
                 let wraps = is_wrapped(column) && is_angle(&series[0], column);
                 if wraps {
-                    unwrap(&mut series.to_mut()[0]);
+                    unwrap(&mut series.to_mut()[0], largest(column));
                 }
                 let place = COLUMNS[index(column)?].2;
                 Target::Column { place, held: is_held(column), wraps }
@@ -145,20 +145,64 @@ impl At {
     }
 }
 
-/// Whether a series can be radians at all: a heading may run to 2π, a roll angle to π. Wrapping
-/// anything larger would hide that it is in degrees.
-fn is_angle(series: &[f64], column: &str) -> bool {
-    let limit = if column == "yaw_rad" { TAU } else { PI };
-    series.iter().all(|x| x.abs() <= limit + 1e-3)
+/// The largest size of an angle in radians: a heading may run to 2π, a roll angle to π.
+fn largest(column: &str) -> f64 {
+    (if column == "yaw_rad" { TAU } else { PI }) + 1e-3
 }
 
-fn unwrap(angles: &mut [f64]) {
-    for i in 1..angles.len() {
-        angles[i] -= ((angles[i] - angles[i - 1]) / TAU).round() * TAU;
+/// Share of the samples of an angle that may be damaged.
+const DAMAGED: f64 = 0.01;
+
+/// Whether a series can be radians at all. Wrapping a series that is larger would hide that it is in degrees.
+fn is_angle(series: &[f64], column: &str) -> bool {
+    let limit = largest(column);
+    let beyond = series.iter().filter(|x| !is_within(**x, limit)).count();
+    beyond as f64 <= DAMAGED * series.len() as f64
+}
+
+fn is_within(angle: f64, limit: f64) -> bool {
+    angle.abs() <= limit
+}
+
+/// Makes `angles` continuous. A damaged one, larger than `limit`, becomes NaN.
+fn unwrap(angles: &mut [f64], limit: f64) {
+    let mut last: Option<f64> = None;
+    for angle in angles {
+        if !is_within(*angle, limit) {
+            *angle = f64::NAN;
+            continue;
+        }
+        if let Some(last) = last {
+            *angle -= ((*angle - last) / TAU).round() * TAU;
+        }
+        last = Some(*angle);
     }
 }
 
 /// Brings an interpolated angle back to −π..π.
 fn wrap(angle: f64) -> f64 {
     angle - (angle / TAU).round() * TAU
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_damaged_angle_does_not_end_the_unwrapping_of_the_others() {
+        // a slow turn through ±π
+        let turn: Vec<f64> = (0..400).map(|k| wrap(0.02 * f64::from(k))).collect();
+        let mut damaged = turn.clone();
+        damaged[200] = 1e30;
+        assert!(is_angle(&damaged, "roll_rad"));
+        unwrap(&mut damaged, largest("roll_rad"));
+        for (k, x) in damaged.iter().enumerate() {
+            let off = (x - 0.02 * k as f64).abs();
+            assert!(if k == 200 { x.is_nan() } else { off < 1e-9 }, "{k} {x}");
+        }
+        // a bank of 20° for a fiftieth of the time, in degrees
+        let mut degrees = vec![1.0; 400];
+        degrees[..8].fill(20.0);
+        assert!(!is_angle(&degrees, "roll_rad"));
+    }
 }

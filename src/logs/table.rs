@@ -9,6 +9,7 @@
 //! of its samples, because interpolated rows would count as measurements. The other rows stay empty; required columns
 //! hold the last value there.
 
+mod absent;
 mod clean;
 mod whole;
 
@@ -227,8 +228,12 @@ fn choose<'a>(
     choice: &Choice,
 ) -> (Vec<Track<'a>>, Vec<Finding>) {
     let (mut chosen, mut findings): (Vec<Track<'a>>, Vec<Finding>) = (Vec::new(), Vec::new());
+    let mut absent: Vec<&Rule> = Vec::new();
     for rule in rules {
-        let Some(track) = track(topics, rule, choice.instance(rule)) else { continue };
+        let Some(track) = track(topics, rule, choice.instance(rule)) else {
+            absent.push(rule);
+            continue;
+        };
         let same = |t: &&mut Track<'a>| t.rule.columns()[0] == rule.columns()[0];
         let filled = |t: &Track<'a>| t.rule.columns().iter().any(|c| rule.columns().contains(c));
         let taken = chosen.iter().any(filled);
@@ -257,6 +262,7 @@ fn choose<'a>(
             }
         }
     }
+    findings.extend(absent::finding(&absent));
     (chosen, findings)
 }
 

@@ -18,7 +18,7 @@ use std::ops::Range;
 use super::finding::Finding;
 use super::format::MAVLINK_MARKERS;
 use super::stretches::Keep;
-use super::topics::{Naming, Topic, Topics};
+use super::topics::{MOST_FLIGHTS, Naming, Topic, Topics, too_many};
 use super::window::Window;
 use greylag_link::framing::{Frame, MAX_FRAME, Whole, frame_len, whole};
 use greylag_link::logged::{self, Logged, Own};
@@ -177,7 +177,11 @@ impl Reader {
                 "the file ends in the middle of a record, {cut} bytes of which are left out"
             )));
         }
-        let lives = self.lives(&clocks);
+        let mut lives = self.lives(&clocks);
+        if lives.len() > MOST_FLIGHTS {
+            lives.truncate(MOST_FLIGHTS);
+            self.out.findings.push(too_many());
+        }
         match &lives[..] {
             [] => vec![self.only_life(None, clocks)],
             [(system, _)] => vec![self.only_life(Some(*system), clocks)],

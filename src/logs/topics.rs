@@ -124,6 +124,17 @@ impl Naming {
     }
 }
 
+/// Largest number of flights that are read of one file. Each has a copy of the parameters, so the thousands of restarts of a
+/// damaged file would take all memory.
+pub(super) const MOST_FLIGHTS: usize = 200;
+
+/// Finding on a file of more than [`MOST_FLIGHTS`] flights.
+pub(super) fn too_many() -> Finding {
+    Finding::warning(format!(
+        "the clock of the file starts again more often than a log's does: the first {MOST_FLIGHTS} flights are read, the others left out"
+    ))
+}
+
 /// The content of a binary log, or of one boot of a vehicle in it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Topics {

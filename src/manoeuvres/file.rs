@@ -294,7 +294,9 @@ fn check_step(step: &Step) -> Result<(), String> {
         within(&format!("amplitude on {}", e.axis.name()), e.amplitude, -most, most)?;
         within("start_s", e.start, 0.0, step.duration)?;
         within("authority", e.authority, 0.0, 1.0)?;
-        if e.length().is_finite() {
+        // a step and a multisine may last to the end of their step of the schedule
+        let pulses = matches!(e.shape, Shape::Doublet { .. } | Shape::ThreeTwoOneOne { .. });
+        if pulses || e.length() != f64::INFINITY {
             within("width_s of the whole excitation", e.length(), 0.01, step.duration - e.start)?;
         }
     }
@@ -327,6 +329,24 @@ mod tests {
             let back = Schedule::parse(&schedule.to_toml());
             assert!(back.is_ok(), "{}: {back:?}", manoeuvre.name);
         }
+    }
+
+    #[test]
+    fn a_pulse_has_a_finite_width() {
+        let with = |shape: Shape| {
+            let step = Step::hold(5.0, 0.0, 0.0, 15.0);
+            let excitation = Excitation::new(Axis::Elevator, 0.1, 0.0, shape);
+            Schedule::new("s", "", vec![step.with(excitation)])
+        };
+        for width in [f64::NAN, f64::INFINITY] {
+            for shape in [Shape::Doublet { width }, Shape::ThreeTwoOneOne { width }] {
+                let why = with(shape).unwrap_err();
+                assert!(why.contains("width_s of the whole excitation"), "{why}");
+            }
+        }
+        assert!(with(Shape::Step { width: f64::NAN }).is_err());
+        assert!(with(Shape::Step { width: f64::INFINITY }).is_ok());
+        assert!(with(Shape::Doublet { width: 0.5 }).is_ok());
     }
 
     #[test]

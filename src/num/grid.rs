@@ -34,6 +34,9 @@ pub enum GridError {
     /// The number of values does not match the grid.
     #[error("a grid of {0} by {1} points needs {0} rows of {1} values")]
     Uneven(usize, usize),
+    /// Points are so close that a slope is not finite.
+    #[error("a grid's points must not be so close that a slope is infinite: some up to row {} are", .0 + 1)]
+    TooSteep(usize),
     /// A value is not finite.
     #[error("a grid's values must be finite: row {}, column {} is not", .0 + 1, .1 + 1)]
     NotFinite(usize, usize),
@@ -72,8 +75,8 @@ impl Grid {
     /// The function with the value `values[i][j]` at (`x[i]`, `y[j]`). Both `x` and `y` must increase.
     ///
     /// # Errors
-    /// If `x` or `y` does not increase, the values do not match the grid, a number is not finite, or there are fewer than 2 by 2
-    /// or more than 100 by 16 points.
+    /// If `x` or `y` does not increase, a slope is infinite, the values do not match the grid, a number is not finite, or there
+    /// are fewer than 2 by 2 or more than 100 by 16 points.
     pub fn new(x: &[f64], y: &[f64], values: &[Vec<f64>]) -> Result<Grid, GridError> {
         let of = |variable| move |why| GridError::Axis { variable, why };
         increasing(x, MOST_ROWS).map_err(of("the first variable"))?;
@@ -87,12 +90,13 @@ impl Grid {
             }
         }
         let slope = |i: usize| along(y, |j| (values[i][j] - values[i - 1][j]) / (x[i] - x[i - 1]));
-        Ok(Grid {
-            x: x.to_vec(),
-            y: y.to_vec(),
-            first: along(y, |j| values[0][j]),
-            slopes: (1..x.len()).map(slope).collect(),
-        })
+        let first = along(y, |j| values[0][j]);
+        let slopes: Vec<Vec<f64>> = (1..x.len()).map(slope).collect();
+        let mut all = std::iter::once(&first).chain(&slopes);
+        if let Some(i) = all.position(|row| row.iter().any(|s| !s.is_finite())) {
+            return Err(GridError::TooSteep(i));
+        }
+        Ok(Grid { x: x.to_vec(), y: y.to_vec(), first, slopes })
     }
 
     /// The points along the first and along the second variable.
@@ -170,6 +174,8 @@ mod tests {
         let rows = [vec![1.0, 2.0], vec![3.0, 4.0]];
         assert_eq!(Grid::new(&[0.0, 1.0, 2.0], &[0.0, 1.0], &rows), Err(GridError::Uneven(3, 2)));
         assert!(Grid::new(&[1.0, 1.0], &[0.0, 1.0], &rows).is_err());
+        assert_eq!(Grid::new(&[0.0, 5e-324], &[0.0, 1.0], &rows), Err(GridError::TooSteep(1)));
+        assert_eq!(Grid::new(&[0.0, 1.0], &[0.0, 5e-324], &rows), Err(GridError::TooSteep(0)));
         let lost = [vec![1.0, 2.0], vec![3.0, f64::NAN]];
         assert_eq!(Grid::new(&[0.0, 1.0], &[0.0, 1.0], &lost), Err(GridError::NotFinite(1, 1)));
     }

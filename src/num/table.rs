@@ -30,6 +30,9 @@ pub enum TableError {
     /// The abscissae are not increasing.
     #[error("a table's abscissae must increase: point {} does not", .0 + 1)]
     NotIncreasing(usize),
+    /// Two abscissae are so close that the slope between them is not finite.
+    #[error("a table's abscissae must not be so close that a slope is infinite: points {} and {} are", .0, .0 + 1)]
+    TooSteep(usize),
     /// A number is not finite.
     #[error("a table's numbers must be finite: point {} is not", .0 + 1)]
     NotFinite(usize),
@@ -56,12 +59,14 @@ impl Table {
         if let Some(i) = (1..x.len()).find(|&i| x[i] <= x[i - 1]) {
             return Err(TableError::NotIncreasing(i));
         }
-        let segments = (1..x.len())
-            .map(|i| {
-                let length = x[i] - x[i - 1];
-                (x[i - 1], length, (y[i] - y[i - 1]) / length)
-            })
-            .collect();
+        let segment = |i: usize| {
+            let length = x[i] - x[i - 1];
+            (x[i - 1], length, (y[i] - y[i - 1]) / length)
+        };
+        let segments: Vec<(f64, f64, f64)> = (1..x.len()).map(segment).collect();
+        if let Some(i) = segments.iter().position(|(_, _, slope)| !slope.is_finite()) {
+            return Err(TableError::TooSteep(i + 1));
+        }
         Ok(Table { floor: y[0], segments })
     }
 
@@ -126,5 +131,9 @@ mod tests {
         assert_eq!(Table::new(&[0.0, 1.0], &[1.0]), Err(TableError::Uneven(2, 1)));
         assert_eq!(Table::new(&[0.0, 0.0], &[1.0, 2.0]), Err(TableError::NotIncreasing(1)));
         assert_eq!(Table::new(&[0.0, 1.0], &[1.0, f64::NAN]), Err(TableError::NotFinite(1)));
+        let close = Table::new(&[-1.0, 0.0, 5e-324], &[1.0, 2.0, 3.0]);
+        assert_eq!(close, Err(TableError::TooSteep(2)));
+        assert!(TableError::TooSteep(2).to_string().ends_with("points 2 and 3 are"));
+        assert!(Table::new(&[0.0, 5e-324], &[1.0, 1.0]).is_ok());
     }
 }

@@ -6,6 +6,7 @@ mod fits;
 mod lateral;
 mod propeller;
 mod propulsion;
+mod wing;
 
 use greylag_sitl::plant::{Inputs, Loads, MassProperties, Plant, PlantError, Start, Stops, Travel};
 
@@ -17,6 +18,7 @@ use greylag_physics::rigid_body::RigidBody;
 use greylag_physics::size::Size;
 use lateral::{AileronOverIncidence, WithLift};
 use propeller::Propeller;
+use wing::measure;
 
 /// Metres in a foot.
 const FT: f64 = 0.3048;
@@ -81,6 +83,19 @@ pub enum ImportError {
         /// Deflection at the command 1, rad.
         most: f64,
     },
+    /// A measure of the wing is missing or not positive, so the coefficients have no scale.
+    #[error(
+        "the {what} of the aircraft ({property}) is {value}: coefficients need one above zero; state it in the section metrics of the \
+         aircraft's file"
+    )]
+    Wing {
+        /// What is measured.
+        what: &'static str,
+        /// Name of the property in JSBSim.
+        property: &'static str,
+        /// Value of the property, in feet or square feet.
+        value: f64,
+    },
     /// The aircraft has no positive lift at any incidence of the tables.
     #[error(
         "the aircraft has no lift at {airspeed:.1} m/s: give the airspeed at which it flies with --cruise-mps"
@@ -112,7 +127,8 @@ type Coefficients = [f64; 6];
 ///
 /// # Errors
 ///
-/// If the aircraft cannot be evaluated in JSBSim, has no lift, or has a surface that an airframe file cannot represent.
+/// If the aircraft cannot be evaluated in JSBSim, has no wing area, span or chord, has no lift, or has a surface that an
+/// airframe file cannot represent.
 pub fn import(
     plant: &mut Plant,
     name: &str,
@@ -134,9 +150,9 @@ pub fn import(
     }
     let mass = plant.mass_properties()?;
     let start = Start { airspeed_mps: cruise, altitude_m: altitude, ..Start::NEUTRAL };
-    let area = plant.property("metrics/Sw-sqft")? * FT * FT;
-    let span = plant.property("metrics/bw-ft")? * FT;
-    let chord = plant.property("metrics/cbarw-ft")? * FT;
+    let area = measure(plant, "wing area", "metrics/Sw-sqft")? * FT * FT;
+    let span = measure(plant, "wing span", "metrics/bw-ft")? * FT;
+    let chord = measure(plant, "mean chord", "metrics/cbarw-ft")? * FT;
     let mut subject = Subject { plant, start, area, span, chord, mass, alpha_rate: [0.0; 6] };
     subject.alpha_rate = subject.alpha_rate()?;
     let mut left_out = Vec::new();

@@ -15,7 +15,7 @@ use places::{Places, hashed};
 use tables::print;
 
 use crate::commands::bar::{Bar, shares};
-use crate::commands::distinct::distinct;
+use crate::commands::distinct::{distinct, distinct_names};
 use crate::commands::effect_files::{named_effects, own_effects};
 use crate::commands::files::{self, shipped};
 use crate::commands::given as read;
@@ -114,6 +114,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     let places = Places::new(&path, &model, &arguments.out, overwrite)?;
     distinct(&arguments.logs.paths, &arguments.hold_out)?;
+    if !arguments.per_flight.asked().constants().is_empty() {
+        distinct_names(arguments.logs.paths.iter().chain(&arguments.hold_out))?;
+    }
     let effects = named_effects(&arguments.effects)?;
     check_new(&effects, &model)?;
     let (paths, held) = divided(arguments);
@@ -162,10 +165,12 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 /// The reason why the fit is not written, in a sentence; `None` if it is written. With `--fit-all` no flight is held
-/// out, so an improvement by chance cannot be detected.
+/// out, so an improvement by chance cannot be detected. With `--from-scratch` the model as given is a guess: it is kept
+/// only if a comparison favours it.
 fn given_is_kept(arguments: &Arguments, story: &Amendment) -> Option<String> {
     let by_chance = || story.by_chance().filter(|_| !arguments.fit_all);
-    story.worse().or_else(by_chance).filter(|_| !arguments.accept_anyway)
+    let unjudged = || story.unjudged().filter(|_| !arguments.fit_all && !arguments.from_scratch);
+    story.worse().or_else(by_chance).or_else(unjudged).filter(|_| !arguments.accept_anyway)
 }
 
 /// The next step for the user: a diagnosis of what the amended model still lacks.

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use comfy_table::Table;
 use comfy_table::presets::NOTHING;
 use serde::Serialize;
@@ -107,6 +107,9 @@ pub(super) fn fly(factory: &CompanionFactory, file: &Path) -> Result<ExitCode> {
     let scenario: Scenario = serde_json::from_str(&text).with_context(|| {
         format!("{} holds no scenario; give a file of what --search prints", file.display())
     })?;
+    if let Err(why) = scenario.check() {
+        bail!("{} holds no scenario: {why}", file.display());
+    }
     let rules = policies(&factory.envelope());
     let judged = distances(factory, &rules, &scenario)?;
     let mut broken = false;

@@ -250,7 +250,7 @@ impl Mapping {
     /// The mapping's rules followed by the format's own for the other columns.
     pub(super) fn rules(&self, format: Format, topics: &Topics) -> Vec<Rule> {
         let own = self.entries.iter().map(|(column, e)| {
-            Rule::linear(column, &e.topic, &e.field, e.scale).plus(e.offset).of(e.instance)
+            Rule::linear(column, &e.topic, &e.field, e.scale).plus(e.offset).of(e.instance).own()
         });
         let others = match format {
             Format::Csv => Vec::new(),
@@ -263,10 +263,11 @@ impl Mapping {
         };
         let turn = self.quaternion.as_ref().map(|q| {
             let [a, b, c, d] = q.fields.each_ref().map(String::as_str);
-            match q.order {
-                Some(Order::Xyzw) => Rule::quaternion(&q.topic, [d, a, b, c]),
-                _ => Rule::quaternion(&q.topic, [a, b, c, d]),
-            }
+            let fields = match q.order {
+                Some(Order::Xyzw) => [d, a, b, c],
+                _ => [a, b, c, d],
+            };
+            Rule::quaternion(&q.topic, fields).own()
         });
         let turned = |c: &str| turn.as_ref().is_some_and(|rule| rule.columns().contains(&c));
         let taken = |c: &str| self.entries.contains_key(c) || turned(c);

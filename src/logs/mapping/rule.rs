@@ -40,6 +40,8 @@ impl Shape {
                     x
                 }
             }
+            // no servo is driven by a pulse of zero, which stands for none: the safety switch, or an output not set
+            Shape::Surface { .. } if x <= 0.0 => f64::NAN,
             Shape::Surface { min, trim, max } => {
                 let side = if x > trim { max - trim } else { trim - min };
                 if side > 0.0 { (x - trim) / side } else { 0.0 }
@@ -51,6 +53,8 @@ impl Shape {
 }
 
 /// A field's share in a column.
+///
+/// Without a pulse (zero, as of a disarmed vehicle) a motor stands, and the deflection of a servo is unknown.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Term {
     /// Name of the field.
@@ -59,6 +63,23 @@ pub struct Term {
     pub gain: f64,
     /// Shape that is applied to the field first.
     pub shape: Shape,
+}
+
+impl Term {
+    /// The share of the field's value `x`.
+    fn of(&self, x: f64) -> f64 {
+        match self.shape {
+            // a negative gain is that of reversed pulses or of a difference of motors
+            Shape::Range { .. } if x <= 0.0 => {
+                if self.gain > 0.0 {
+                    0.0
+                } else {
+                    f64::NAN
+                }
+            }
+            shape => self.gain * shape.of(x),
+        }
+    }
 }
 
 /// Axes between which a quaternion turns.
@@ -159,6 +180,8 @@ pub struct Rule {
     pub note: Option<String>,
     /// Whether the airspeed is equivalent airspeed, to be converted to true airspeed with the density.
     pub equivalent: bool,
+    /// Whether the user's mapping names it.
+    pub own: bool,
 }
 
 /// Gas constant of dry air, J/(kg K).
@@ -173,6 +196,7 @@ impl Rule {
             fill,
             note: None,
             equivalent: false,
+            own: false,
         }
     }
 
@@ -243,6 +267,11 @@ impl Rule {
         Rule { equivalent: true, ..self }
     }
 
+    /// The rule as one of the user's mapping.
+    pub fn own(self) -> Rule {
+        Rule { own: true, ..self }
+    }
+
     /// The columns that it fills.
     pub fn columns(&self) -> Vec<&str> {
         match &self.fill {
@@ -293,7 +322,7 @@ impl Rule {
                 for term in terms {
                     let field = topic.field(&term.field)?;
                     for (y, x) in out.iter_mut().zip(field) {
-                        *y += term.gain * term.shape.of(*x);
+                        *y += term.of(*x);
                     }
                 }
                 Some(vec![out])
@@ -324,5 +353,24 @@ impl Rule {
                 Some(vec![p.iter().zip(t).map(density).collect()])
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_pulse_is_no_deflection_and_no_thrust() {
+        let of = |gain: f64, shape: Shape, pulse: f64| {
+            Term { field: "C1".into(), gain, shape }.of(pulse)
+        };
+        let surface = Shape::Surface { min: 1100.0, trim: 1500.0, max: 1900.0 };
+        let range = Shape::Range { min: 1000.0, max: 2000.0 };
+        assert!(of(1.0, surface, 0.0).is_nan());
+        assert_eq!([1100.0, 1500.0, 1900.0].map(|us| of(-1.0, surface, us)), [1.0, 0.0, -1.0]);
+        assert_eq!([0.0, 1000.0, 1500.0].map(|us| of(1.0, range, us)), [0.0, 0.0, 0.5]);
+        assert!(of(-1.0, range, 0.0).is_nan());
+        assert_eq!(of(-1.0, range, 1500.0), -0.5);
     }
 }

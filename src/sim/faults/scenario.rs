@@ -195,6 +195,21 @@ impl Scenario {
         scenario
     }
 
+    /// Checks a scenario from a file.
+    ///
+    /// # Errors
+    /// The legs are not in the order of time. The client flies the last leg of the list that has started, so a leg with an
+    /// earlier one after it would never be flown.
+    pub fn check(&self) -> Result<(), String> {
+        match self.legs.windows(2).find(|pair| pair[1].from_s < pair[0].from_s) {
+            Some([before, after]) => Err(format!(
+                "the leg from {} s comes after the one from {} s; put the legs in the order of time",
+                after.from_s, before.from_s
+            )),
+            _ => Ok(()),
+        }
+    }
+
     /// A copy with one random change.
     pub fn varied(&self, random: &mut impl Rng) -> Scenario {
         let mut changed = self.clone();
@@ -322,5 +337,19 @@ pub(super) fn mode_of(asking: Asking) -> Option<Mode> {
         Asking::Offboard => Some(Mode::Offboard),
         Asking::Hold => Some(Mode::Hold),
         Asking::Disarm | Asking::Arm | Asking::TakeOver => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn legs_out_of_order_are_refused() {
+        let mut scenario = Scenario::of_seed(Counterpart::Sitl, 1);
+        scenario.check().unwrap();
+        scenario.legs.swap(1, 2);
+        let why = scenario.check().unwrap_err();
+        assert!(why.contains("the leg from 12 s comes after the one from 20 s"), "{why}");
     }
 }

@@ -198,7 +198,8 @@ fn of_right(
         tuned: tuned.parameters.clone(),
         flights: fit.flights.clone(),
         held_out: held_out.iter().map(|f| f.name.clone()).collect(),
-        decrease: judge::judged_at(&given).and_then(|s| judge.decrease(s, as_given, &fit.model)),
+        decrease: compared_at(options.prior, &given)
+            .and_then(|s| judge.decrease(s, as_given, &fit.model)),
         given,
         before,
         after,
@@ -214,6 +215,15 @@ fn of_right(
     amendment.sentences = rudder.map(rudder::warning).into_iter().collect();
     amendment.sentences.extend(story::sentences(&amendment));
     Ok(Amended { amendment, model: fit.model, tuned: tuned.model })
+}
+
+/// Horizon at which the fit is compared with the model as given, s, from the scores `given` of the latter.
+fn compared_at(prior: Prior, given: &[HorizonScore]) -> Option<f64> {
+    match prior {
+        Prior::File => judge::repeated_at(given),
+        // a model whose coefficients are guesses is not kept because few runs are long enough
+        Prior::Bounds => judge::judged_at(given),
+    }
 }
 
 /// Flights of the fit, corrected with the constants in the model's file.

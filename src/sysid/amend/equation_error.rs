@@ -1,5 +1,7 @@
 //! Equation-error fit in weak form: it converges from poor values and provides starting values for the output-error fit.
 
+use std::cmp::Ordering;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -14,6 +16,8 @@ const CHANNELS: usize = 6;
 const ITERATIONS: usize = 5;
 /// Number of iterations from each starting point before the starting points are compared.
 const TRIAL: usize = 2;
+/// Largest number of starting points. Two effects of files with three shape constants each can have thousands.
+const MOST_STARTS: usize = 256;
 /// Convergence tolerance: decrease of the weighted sum of squares for a change by a tenth of a standard deviation.
 const COST_TOLERANCE: f64 = 0.01;
 /// Number of independent samples for which a window counts: windows overlap by half.
@@ -24,14 +28,15 @@ const INDEPENDENT_FRACTION: f64 = 0.5;
 pub(super) fn start(model: &GreyBox, free: &[Free], flights: &[Flight]) -> Vec<f64> {
     let starts = starts(free);
     let trials = if starts.len() > 1 { TRIAL } else { 0 };
-    let tried: Vec<(f64, Vec<f64>)> =
+    let tried: Vec<(Misfit, Vec<f64>)> =
         starts.into_par_iter().map(|theta| search(model, free, flights, theta, trials)).collect();
-    let best = tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    let best = tried.into_iter().min_by(|a, b| a.0.order(&b.0));
     let theta = best.map_or_else(|| free.iter().map(|f| f.prior).collect(), |(_, theta)| theta);
     search(model, free, flights, theta, ITERATIONS).1
 }
 
-/// Starting points: the prior means, with the catalogue's starting values for the shape constants of added effects.
+/// Starting points: the prior means, with every combination of the catalogue's starting values for the shape constants of
+/// added effects. A constant that would lead to more than [`MOST_STARTS`] combinations keeps its prior mean.
 fn starts(free: &[Free]) -> Vec<Vec<f64>> {
     let mut starts: Vec<Vec<f64>> = vec![free.iter().map(|f| f.prior).collect()];
     for (k, f) in free.iter().enumerate().filter(|(_, f)| f.added && !f.linear) {
@@ -42,13 +47,19 @@ fn starts(free: &[Free]) -> Vec<Vec<f64>> {
         let mut values: Vec<f64> = entry.iter().map(|s| s[place]).collect();
         values.sort_by(f64::total_cmp);
         values.dedup();
-        if values.len() > 1 {
-            let each =
-                |value: &f64| starts.iter().map(|s| replaced(s, k, *value)).collect::<Vec<_>>();
-            starts = values.iter().flat_map(each).collect();
-        }
+        starts = combined(starts, k, &values);
     }
     starts
+}
+
+/// Each of `starts` with each of `values` in `place`; `starts` as they are if there are fewer than two values, or if the
+/// combinations would be more than [`MOST_STARTS`].
+fn combined(starts: Vec<Vec<f64>>, place: usize, values: &[f64]) -> Vec<Vec<f64>> {
+    if values.len() < 2 || starts.len() * values.len() > MOST_STARTS {
+        return starts;
+    }
+    let each = |value: &f64| starts.iter().map(|s| replaced(s, place, *value)).collect::<Vec<_>>();
+    values.iter().flat_map(each).collect()
 }
 
 fn replaced(values: &[f64], place: usize, value: f64) -> Vec<f64> {
@@ -85,14 +96,14 @@ fn search(
     flights: &[Flight],
     mut theta: Vec<f64>,
     iterations: usize,
-) -> (f64, Vec<f64>) {
-    let mut best = (f64::INFINITY, theta.clone());
+) -> (Misfit, Vec<f64>) {
+    let mut best = (Misfit::WORST, theta.clone());
     for iteration in 0..=iterations {
         let present = parameters::with(model, free, &theta);
         let r = residuals(&present, flights);
         let weights = weights(&r);
         let cost = misfit(&r);
-        if cost < best.0 {
+        if cost.order(&best.0).is_lt() {
             best = (cost, theta.clone());
         }
         if iteration == iterations {
@@ -115,15 +126,37 @@ fn weights(r: &Residuals) -> [f64; CHANNELS] {
     std::array::from_fn(|k| 1.0 / mean_square(r, k))
 }
 
+/// Mean square of a channel's residuals; 1 if none is finite, so that the channel has no effect on a sum of logarithms.
 fn mean_square(r: &Residuals, channel: usize) -> f64 {
     let own = r.values.iter().zip(&r.channel).filter(|(x, c)| **c == channel && x.is_finite());
     let (sum, n) = own.fold((0.0, 0.0), |(s, n), (x, _)| (s + x * x, n + 1.0));
     if n > 0.0 { sum / n } else { 1.0 }
 }
 
-/// Concentrated negative log-likelihood: Σ ln of the channels' mean squares.
-fn misfit(r: &Residuals) -> f64 {
-    (0..CHANNELS).map(|k| mean_square(r, k).max(1e-12).ln()).sum()
+/// How far the coefficients are from the flights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Misfit {
+    /// Number of channels without a finite residual. Every point has those that are not measured; a point with more has
+    /// predictions that are no numbers, whatever its cost over the other channels.
+    missing: usize,
+    /// Concentrated negative log-likelihood: Σ ln of the channels' mean squares.
+    cost: f64,
+}
+
+impl Misfit {
+    const WORST: Misfit = Misfit { missing: usize::MAX, cost: f64::INFINITY };
+
+    fn order(&self, other: &Misfit) -> Ordering {
+        self.missing.cmp(&other.missing).then(self.cost.total_cmp(&other.cost))
+    }
+}
+
+fn misfit(r: &Residuals) -> Misfit {
+    let finite = |k: usize| r.values.iter().zip(&r.channel).any(|(x, c)| *c == k && x.is_finite());
+    Misfit {
+        missing: (0..CHANNELS).filter(|k| !finite(*k)).count(),
+        cost: (0..CHANNELS).map(|k| mean_square(r, k).max(1e-12).ln()).sum(),
+    }
 }
 
 /// A Gauss–Newton step.
@@ -176,4 +209,33 @@ fn step(
     change.component_mul_assign(&scale);
     let gain = change.dot(&right);
     Some(Step { change, gain })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn predictions_that_are_no_numbers_lose_against_poor_ones() {
+        // the first channel is not measured
+        let of = |roll: f64| Residuals {
+            values: vec![f64::NAN, 10.0, 10.0, 10.0, roll, 10.0],
+            channel: (0..CHANNELS).collect(),
+        };
+        let (none, poor) = (misfit(&of(f64::NAN)), misfit(&of(1e6)));
+        assert_eq!((none.missing, poor.missing), (2, 1));
+        assert!(none.cost < poor.cost && poor.order(&none).is_lt());
+        assert!(misfit(&of(1.0)).order(&poor).is_lt() && none.order(&Misfit::WORST).is_lt());
+    }
+
+    #[test]
+    fn the_number_of_starting_points_is_bounded() {
+        let mut starts = vec![vec![0.0; 10]];
+        for place in 0..10 {
+            starts = combined(starts, place, &[1.0, 2.0, 3.0, 4.0]);
+        }
+        assert_eq!(starts.len(), MOST_STARTS);
+        assert!(starts.iter().all(|s| s[..4].iter().all(|x| *x > 0.0) && s[4..] == [0.0; 6]));
+        assert_eq!(combined(vec![vec![0.0]], 0, &[1.0]), [[0.0]]);
+    }
 }

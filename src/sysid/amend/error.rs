@@ -37,6 +37,15 @@ pub enum AmendError {
         /// Smallest number of flights for the cross-validation.
         needed: usize,
     },
+    /// Two flights of one name cannot have constants of their own, which the model's file keeps by the flights' names.
+    #[error(
+        "cannot estimate trims or axes for each flight: two of them are called {name}, and the model's file keeps these constants by \
+         name; rename one of the logs"
+    )]
+    OneName {
+        /// The name of both flights.
+        name: String,
+    },
     /// No coefficient is free.
     #[error(
         "cannot fit {model}: every coefficient is zero without a stated sd, so none may change; give \

@@ -147,8 +147,19 @@ pub fn judged_at(scores: &[HorizonScore]) -> Option<f64> {
     judge_of(scores).map(|s| s.horizon_s)
 }
 
+/// The longest horizon up to [`JUDGED_AT_S`] that at least two runs reach, s. With a single run the difference of two models
+/// has no standard error.
+pub fn repeated_at(scores: &[HorizonScore]) -> Option<f64> {
+    longest(scores, 2).map(|s| s.horizon_s)
+}
+
 fn judge_of(scores: &[HorizonScore]) -> Option<&HorizonScore> {
-    let reached = scores.iter().filter(|s| s.runs > 0 && s.horizon_s <= JUDGED_AT_S + 1e-9);
+    longest(scores, 1)
+}
+
+/// The score at the longest horizon up to [`JUDGED_AT_S`] that at least `runs` runs reach.
+fn longest(scores: &[HorizonScore], runs: usize) -> Option<&HorizonScore> {
+    let reached = scores.iter().filter(|s| s.runs >= runs && s.horizon_s <= JUDGED_AT_S + 1e-9);
     reached.max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s))
 }
 

@@ -1,6 +1,7 @@
 //! Constants of the flights and of the common installation that a fit has estimated, as written to the model's file.
 
 use super::flight::{OFFSETS, Own, SENSORS, SKEW};
+use crate::amend::error::AmendError;
 use crate::per_flight::PerFlight;
 use greylag_model::{FlightConstants, Known};
 
@@ -27,6 +28,21 @@ impl Learned<'_> {
 
     fn sensors(&self) -> [[f64; 2]; OFFSETS.len()] {
         std::array::from_fn(|k| [self.own.sensors[SKEW + 1 + k], self.sd[SKEW + 1 + k]])
+    }
+}
+
+/// Checks that the flights, called `names`, can have the constants `asked`, which the model's file keeps by name.
+///
+/// # Errors
+/// Two flights have the same name.
+pub(super) fn distinct(names: &[&str], asked: &PerFlight) -> Result<(), AmendError> {
+    if asked.angles() == 0 && !asked.has_trims() {
+        return Ok(());
+    }
+    let again = |(k, name): (usize, &&str)| names[..k].contains(name).then(|| (*name).to_owned());
+    match names.iter().enumerate().find_map(again) {
+        Some(name) => Err(AmendError::OneName { name }),
+        None => Ok(()),
     }
 }
 
@@ -103,6 +119,19 @@ pub(super) fn in_words(installation: &FlightConstants) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn two_flights_of_one_name_have_no_constants_of_their_own() {
+        let trims = PerFlight { trims: Some(1.0), askew_deg: None };
+        let askew = PerFlight { trims: None, askew_deg: Some(3.0) };
+        let twice = ["flight.csv", "other.csv", "flight.csv"];
+        for asked in [trims, askew] {
+            let why = distinct(&twice, &asked).unwrap_err().to_string();
+            assert!(why.contains("two of them are called flight.csv"), "{why}");
+            distinct(&twice[..2], &asked).unwrap();
+        }
+        distinct(&twice, &PerFlight::default()).unwrap();
+    }
 
     #[test]
     fn a_mean_is_common_only_where_flights_agree_on_it() {

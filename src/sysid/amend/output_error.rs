@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use super::equation_error;
 use super::error::AmendError;
 use super::flight::{Flight, Own, SENSORS, SKEW, SKEW_LEAST};
+use super::learned;
 use super::normal::{self, Neighbourhood, Place, Weights};
 use super::parameters::{self, Free};
 use super::result::{FittedFlight, Parameter};
@@ -102,8 +103,9 @@ pub(super) struct Left {
 /// Fits the free coefficients of `model` to `flights`. `progress` receives the stages and may cancel.
 ///
 /// # Errors
-/// The flights are shorter than `LEAST_S`, no coefficient is free, the flights excite none, free runs diverge too early,
-/// the search does not converge or its equations are singular, or `progress` cancelled.
+/// The flights are shorter than `LEAST_S`, two flights of one name are to have constants of their own, no coefficient is
+/// free, the flights excite none, free runs diverge too early, the search does not converge or its equations are singular,
+/// or `progress` cancelled.
 pub fn fit(
     model: &GreyBox,
     flights: &[Flight],
@@ -115,6 +117,8 @@ pub fn fit(
     if flown_s < LEAST_S {
         return Err(AmendError::TooLittle { model: name(), flown_s, needed_s: LEAST_S });
     }
+    let names: Vec<&str> = flights.iter().map(|f| f.prepared.name.as_str()).collect();
+    learned::distinct(&names, &options.per_flight)?;
     let added: Vec<&str> = options.added.iter().map(String::as_str).collect();
     let free = parameters::free(model, &added);
     if free.is_empty() {

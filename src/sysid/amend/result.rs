@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::conventions::Tried;
 use super::flight::SENSORS;
-use super::judge::{CLEAR, judged, judged_at};
+use super::judge::{CLEAR, judged, judged_at, repeated_at};
 use crate::compare::{Answer, HorizonScore};
 use crate::per_flight::{Constant, PerFlight};
 
@@ -172,7 +172,8 @@ pub struct Amendment {
     /// Held-out free-run errors with the effects added.
     pub after: Vec<HorizonScore>,
     /// Mean of ln(scaled error of the model as given / scaled error of the fit), paired over the free runs of the held-out flights,
-    /// and its standard error; `None` if fewer than two runs reach a horizon.
+    /// and its standard error, at the longest horizon up to `judged_at_s` that two runs reach; `None` if there is none. A fit
+    /// without a prior is compared at the longest horizon that a run reaches, and has `None` if only one does.
     pub decrease: Option<[f64; 2]>,
     /// Further notes for the reader.
     pub notes: Vec<String>,
@@ -197,23 +198,35 @@ impl Amendment {
         let percent = |sd: f64| (100.0 * (1.0 - (-(mean + sd * error)).exp())).round() + 0.0;
         (self.only_tuned() && mean < CLEAR * error).then(|| {
             self.kept(&format!(
-                "on the flights for validation the fit may be better by chance (95 % interval of the decrease of the error: \
-                 {} to {} %)",
+                "on the flights for validation the fit may be better by chance (95 % interval of the decrease of the error \
+                 over {} s: {} to {} %)",
+                repeated_at(&self.given).unwrap_or_default(),
                 percent(-CLEAR),
                 percent(CLEAR)
             ))
         })
     }
 
-    /// Sentence that the given model is kept, with the reason `why` and the errors.
+    /// Sentence that the given model is kept because only its coefficients were tuned and `decrease` is unknown: an improvement
+    /// by chance cannot be excluded. `None` otherwise.
+    pub fn unjudged(&self) -> Option<String> {
+        (self.decrease.is_none() && self.only_tuned()).then(|| {
+            self.kept(
+                "the flights for validation are too short for two free runs, so the fit may be better by chance; hold out \
+                 longer flights, or more of them",
+            )
+        })
+    }
+
+    /// Sentence that the given model is kept, with the reason `why` and the errors if a free run has any.
     fn kept(&self, why: &str) -> String {
-        let error = |scores| judged(scores).unwrap_or(f64::NAN);
-        format!(
-            "The model as given is kept: {why}. {:.5} became {:.5} of the reference scale in free runs of {} s.",
-            error(&self.given),
-            error(&self.after),
-            judged_at(&self.given).unwrap_or_default()
-        )
+        let errors = judged(&self.given).zip(judged(&self.after)).zip(judged_at(&self.given));
+        let errors = errors.map_or(String::new(), |((given, after), seconds)| {
+            format!(
+                " {given:.5} became {after:.5} of the reference scale in free runs of {seconds} s."
+            )
+        });
+        format!("The model as given is kept: {why}.{errors}")
     }
 
     /// Whether the fit differs from the model as given in its coefficients only.
@@ -226,5 +239,72 @@ impl Amendment {
     /// Whether effects were requested and none of them joined.
     pub fn all_refused(&self) -> bool {
         !self.effects.is_empty() && !self.effects.iter().any(|e| e.joined)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::amend::judge::JUDGED_AT_S;
+
+    /// Scores of `runs`, each with its horizon (s) and the number of runs.
+    fn scores(runs: &[(f64, usize)], error: f64) -> Vec<HorizonScore> {
+        let score = |&(horizon_s, runs): &(f64, usize)| HorizonScore {
+            horizon_s,
+            runs,
+            diverged: 0,
+            divergence_rate: 0.0,
+            rmse_scaled: error,
+            states: Vec::new(),
+        };
+        runs.iter().map(score).collect()
+    }
+
+    fn tuned(runs: &[(f64, usize)], decrease: Option<[f64; 2]>) -> Amendment {
+        Amendment {
+            schema: "greylag.amend/1",
+            version: "0",
+            model: "a".into(),
+            answer: Answer::nothing(),
+            sentences: Vec::new(),
+            effects: Vec::new(),
+            conventions: Vec::new(),
+            parameters: Vec::new(),
+            tuned: Vec::new(),
+            flights: Vec::new(),
+            held_out: Vec::new(),
+            given: scores(runs, 0.5),
+            before: scores(runs, 0.25),
+            after: scores(runs, 0.25),
+            decrease,
+            notes: Vec::new(),
+            settings: Settings {
+                lengths_s: Vec::new(),
+                horizons_s: Vec::new(),
+                judged_at_s: JUDGED_AT_S,
+                per_flight: PerFlight::default(),
+            },
+        }
+    }
+
+    #[test]
+    fn an_improvement_that_too_few_runs_can_judge_keeps_the_model_as_given() {
+        // one run reaches 5 s, two reach 2 s
+        let runs = [(1.0, 3), (2.0, 2), (5.0, 1), (10.0, 0)];
+        let chance = tuned(&runs, Some([0.1, 0.1]));
+        assert_eq!((judged_at(&chance.given), repeated_at(&chance.given)), (Some(5.0), Some(2.0)));
+        assert_eq!((chance.worse(), chance.unjudged()), (None, None));
+        let why = chance.by_chance().unwrap();
+        assert!(why.contains("over 2 s: -10 to 26 %"), "{why}");
+        assert_eq!(tuned(&runs, Some([0.3, 0.1])).by_chance(), None);
+        let alone = tuned(&[(1.0, 1)], None);
+        assert_eq!((alone.by_chance(), repeated_at(&alone.given)), (None, None));
+        let why = alone.unjudged().unwrap();
+        assert!(why.contains("too short") && why.contains("in free runs of 1 s"), "{why}");
+        let why = tuned(&[(1.0, 0)], None).unjudged().unwrap();
+        assert!(!why.contains("NaN") && !why.contains("became"), "{why}");
+        let joined = AddedEffect { joined: true, ..AddedEffect::asked_for("motor_torque") };
+        let effects = Amendment { effects: vec![joined], ..tuned(&[(1.0, 1)], None) };
+        assert_eq!(effects.unjudged(), None);
     }
 }

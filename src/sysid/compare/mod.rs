@@ -28,3 +28,5 @@ pub use result::{
     Regime, RegimeBins, Settings, StateScore,
 };
 pub use run::{Options, abstentions, compare, scores};
+#[cfg(feature = "study")]
+pub(crate) use verdict::unpredicted;

@@ -32,6 +32,8 @@ use greylag_model::GreyBox;
 
 /// Reasons why a channel is not assessed.
 const UNMOVED: &str = "these flights do not move it above the sensors' noise";
+const NOISE_UNKNOWN: &str =
+    "its noise cannot be computed, because the model predicts no number beside a measured state";
 const DOUBTFUL: &str = "the uncertainty of the sensor errors may explain the whole residual";
 
 /// Options of a comparison.
@@ -292,14 +294,16 @@ fn channel(
     let within_doubt = (power.residual - power.noise).max(0.0).sqrt()
         < doubt::NORMAL_95 * doubt::level(residuals.iter().map(|r| &r.shift));
     let unexplained = power.unexplained();
+    let unknown = unknown(&power);
     let abstained = match found {
-        _ if unexplained.is_nan() => Some(UNMOVED),
+        _ if unexplained.is_nan() => Some(unknown),
         None if within_doubt && unexplained >= NOTHING_LEFT => Some(DOUBTFUL),
         _ => None,
     };
     let worst_regime = sentence(&Subject {
         channel: id,
         unexplained,
+        unknown,
         finding: found.as_ref(),
         follows: finding::follows(&bins),
         within_doubt,
@@ -323,6 +327,11 @@ fn channel(
         bins,
         map: bins::map(residuals),
     }
+}
+
+/// Reason why the unexplained share of a channel with `power` is NaN, if it is.
+fn unknown(power: &Power) -> &'static str {
+    if power.noise.is_nan() { NOISE_UNKNOWN } else { UNMOVED }
 }
 
 /// Rate of the scaled state error (error / x_c) for one unit of a channel, 1/s per unit.
@@ -371,4 +380,18 @@ fn channel_trace(flight: &Prepared, series: &Series) -> ChannelTrace {
         trace.predicted.push(series.predicted[k]);
     }
     trace
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_channel_of_unknown_noise_is_not_called_unmoved() {
+        let power = |noise| Power { measured: 4.0, residual: 1.0, noise, offset: 0.0 };
+        for (noise, why) in [(f64::NAN, NOISE_UNKNOWN), (3.9, UNMOVED)] {
+            assert!(power(noise).unexplained().is_nan());
+            assert_eq!(unknown(&power(noise)), why);
+        }
+    }
 }

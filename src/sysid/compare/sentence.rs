@@ -13,8 +13,10 @@ pub const NOTHING_LEFT: f64 = 0.001;
 pub struct Subject<'a> {
     /// Identifier of the channel.
     pub channel: ChannelId,
-    /// Unexplained share of the channel's variance; NaN if the flights do not excite the channel above the noise.
+    /// Unexplained share of the channel's variance; NaN if it is not defined.
     pub unexplained: f64,
+    /// Reason for a NaN in `unexplained`.
+    pub unknown: &'a str,
     /// Worst regime of the channel; `None` if there is none.
     pub finding: Option<&'a Finding>,
     /// The variable that the residual mainly follows; `None` if there is none.
@@ -34,9 +36,7 @@ const QUIET: f64 = 9.995;
 pub fn sentence(subject: &Subject) -> String {
     let noun = noun(subject.channel);
     if subject.unexplained.is_nan() {
-        return format!(
-            "{noun}: these flights do not move it above the sensors' noise, so nothing can be said"
-        );
+        return format!("{noun}: {}, so nothing can be said", subject.unknown);
     }
     let share = percent(100.0 * subject.unexplained);
     if subject.unexplained < NOTHING_LEFT {
@@ -278,6 +278,7 @@ mod tests {
         sentence(&Subject {
             channel,
             unexplained: 0.4,
+            unknown: "",
             within_doubt: false,
             finding: Some(&finding),
             follows: None,
@@ -292,6 +293,7 @@ mod tests {
             sentence(&Subject {
                 channel: ChannelId::Roll,
                 unexplained,
+                unknown: "it is unknown",
                 within_doubt: false,
                 finding: None,
                 follows: None,
@@ -301,6 +303,7 @@ mod tests {
         };
         let quiet = of(4232.66);
         assert!(quiet.contains("rolling moment hardly varies") && !quiet.contains('%'), "{quiet}");
+        assert!(of(f64::NAN).ends_with(": it is unknown, so nothing can be said"));
         assert!(of(7.18).contains("718 % of its variation is unexplained"), "{}", of(7.18));
     }
 

@@ -73,7 +73,21 @@ impl Flight {
     }
 }
 
-/// Step at time `at_s`, s.
+/// Number of the step of 0.01 s in which the time `at_s`, s, lies.
 fn at_step(at_s: f64) -> u64 {
-    (100.0 * at_s) as u64
+    // 0.29 s is step 29, although 100 · 0.29 is 28.999999999999996
+    (100.0 * at_s + 1e-6) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_in_whole_steps_is_its_own_step() {
+        for step in 0..6000 {
+            assert_eq!(at_step(step as f64 / 100.0), step);
+        }
+        assert_eq!([0.29, 33.009_25].map(at_step), [29, 3300]);
+    }
 }

@@ -169,6 +169,18 @@ mod tests {
     }
 
     #[test]
+    fn a_forecast_of_the_same_error_is_equal() {
+        let scores = [(Way::Given, score(0.5, 1.2, 0.01))];
+        for (error, beside) in [(0.5, "equal to"), (0.4, "worse than"), (0.6, "better than")] {
+            let forecast = score(error, 1.2, 0.01);
+            let baseline = Some(("hold the state", forecast.as_slice()));
+            let answer = Answer::of(&Subject { baseline, ..subject(&scores, Vec::new()) });
+            let wanted = format!("is 0.5, {beside} the best forecast");
+            assert!(answer.error.contains(&wanted), "{}", answer.error);
+        }
+    }
+
+    #[test]
     fn tuning_and_effect_have_each_their_own_fall() {
         let scores = [
             (Way::Given, score(0.0873, 1.2, 0.01)),

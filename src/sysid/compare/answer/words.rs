@@ -11,9 +11,15 @@ pub fn error(n: &Numbers) -> String {
     if rest.is_empty() {
         text += &format!(" is {}", number(first.error));
         if let Some(b) = &n.baseline {
-            let beside = if b.error < first.error { "worse" } else { "better" };
+            let beside = if number(b.error) == number(first.error) {
+                "equal to"
+            } else if b.error < first.error {
+                "worse than"
+            } else {
+                "better than"
+            };
             text += &format!(
-                ", {beside} than the best forecast without aerodynamics ({}), {}",
+                ", {beside} the best forecast without aerodynamics ({}), {}",
                 b.name,
                 number(b.error)
             );

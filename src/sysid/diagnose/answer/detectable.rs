@@ -14,6 +14,7 @@ use crate::diagnose::regression::cells::Placed;
 use crate::diagnose::regression::projected::Projected;
 use crate::diagnose::regression::rank::{Draw, Trial, deviations};
 use crate::diagnose::search::round::Round;
+use greylag_model::GreyBox;
 
 /// Largest number of amounts evaluated.
 const TRIED: usize = 8;
@@ -86,6 +87,8 @@ struct Sought<'a> {
     /// The size evaluated last, and the ratio of its evidence to the required evidence.
     last: Option<[f64; 2]>,
     found: Option<f64>,
+    /// Whether the model cannot take the effect at the present size, which ends the search.
+    refused: bool,
 }
 
 impl<'a> Sought<'a> {
@@ -101,6 +104,7 @@ impl<'a> Sought<'a> {
             seen: None,
             last: None,
             found: None,
+            refused: false,
         };
         sought.size = sought.turned(starts.first()?[0]);
         let ends = [sought.turned(low), sought.turned(high)];
@@ -160,40 +164,63 @@ fn operators(round: &Round, threshold: f64) -> Vec<(&'static str, f64)> {
         .filter_map(|e| Sought::new(e, &round.trials[of(e)?]))
         .collect();
     for _ in 0..TRIED {
-        let open: Vec<usize> = (0..sought.len()).filter(|k| sought[*k].found.is_none()).collect();
+        let is_open = |s: &Sought| s.found.is_none() && !s.refused;
+        let open: Vec<usize> = (0..sought.len()).filter(|k| is_open(&sought[*k])).collect();
         if open.is_empty() {
             break;
         }
         let ratios =
             ratios(round, threshold, &open.iter().map(|k| &sought[*k]).collect::<Vec<_>>());
         let Some(ratios) = ratios else { break };
-        open.iter().zip(ratios).for_each(|(k, ratio)| sought[*k].tried(ratio));
+        for (k, ratio) in open.into_iter().zip(ratios) {
+            match ratio {
+                Some(ratio) => sought[k].tried(ratio),
+                None => sought[k].refused = true,
+            }
+        }
     }
     sought.iter().filter_map(|s| Some((s.trial.id, s.amount()?))).collect()
 }
 
-/// Ratio of the evidence to the required evidence for each of `sought` at its present size.
-fn ratios(round: &Round, threshold: f64, sought: &[&Sought]) -> Option<Vec<f64>> {
+/// Ratio of the evidence to the required evidence for each of `sought` at its present size; `None` for an effect that the
+/// model cannot take.
+fn ratios(round: &Round, threshold: f64, sought: &[&Sought]) -> Option<Vec<Option<f64>>> {
+    let mut joined = Vec::with_capacity(sought.len());
+    for s in sought {
+        let mut with = round.model.clone();
+        joined.push(with.join(s.trial.id, &[s.turned(s.size)]).ok().map(|()| (*s, with)));
+    }
+    of_those(joined, |joined| ratios_of(round, threshold, joined))
+}
+
+/// Results of `evaluate` for those of `all` that are there, in their places.
+fn of_those<T>(
+    all: Vec<Option<T>>,
+    evaluate: impl FnOnce(&[T]) -> Option<Vec<f64>>,
+) -> Option<Vec<Option<f64>>> {
+    let there: Vec<bool> = all.iter().map(Option::is_some).collect();
+    let some: Vec<T> = all.into_iter().flatten().collect();
+    let results = if some.is_empty() { Vec::new() } else { evaluate(&some)? };
+    let mut results = results.into_iter();
+    Some(there.into_iter().map(|there| if there { results.next() } else { None }).collect())
+}
+
+/// Ratio of the evidence to the required evidence for each effect, given with the model that has it.
+fn ratios_of(round: &Round, threshold: f64, sought: &[(&Sought, GreyBox)]) -> Option<Vec<f64>> {
     let na = round.known.len();
     let last = na + sought.len();
-    let models: Vec<_> = sought
-        .iter()
-        .map(|s| {
-            let mut with = round.model.clone();
-            with.join(s.trial.id, &[s.turned(s.size)]).ok().map(|()| with)
-        })
-        .collect::<Option<_>>()?;
     let mut placed: Vec<Placed> = Vec::new();
     for (flight, old) in round.flights.iter().zip(&round.placed) {
         let mut list: Placed = old.iter().take_while(|(p, _)| *p < na).cloned().collect();
-        list.extend(models.iter().enumerate().map(|(k, with)| (na + k, flight.operator(with))));
+        let columns = sought.iter().map(|(_, with)| flight.operator(with));
+        list.extend(columns.enumerate().map(|(k, column)| (na + k, column)));
         list.push((last, flight.residual.clone()));
         placed.push(list);
     }
     let mut shared = round.shared();
     shared.truncate(na);
     let p = Projected::new(&round.cells, &placed, last, &round.known, &round.noise, &shared)?;
-    let one = |(k, s): (usize, &&Sought)| {
+    let one = |(k, (s, _)): (usize, &(&Sought, GreyBox))| {
         // an effect without any contribution has the ratio 0
         let shown = Shown::new(&p, s.trial, &[k]).filter(|_| p.total[(k, k)] > 0.0);
         shown.map_or(0.0, |shown| 1.0 / (shown.alone * shown.needed(threshold)))
@@ -234,6 +261,15 @@ mod tests {
         // a lower limit is a larger effect
         let found = sought("rate_limit", 3.0, 2.0).unwrap();
         assert!((found / 3.0 - 1.0).abs() < 1.1 * CLOSE, "{found}");
+    }
+
+    #[test]
+    fn an_effect_that_cannot_join_does_not_end_the_search_for_the_others() {
+        let evaluate = |some: &[f64]| Some(some.iter().map(|x| 2.0 * x).collect::<Vec<_>>());
+        let ratios = of_those(vec![Some(1.0), None, Some(3.0)], evaluate);
+        assert_eq!(ratios, Some(vec![Some(2.0), None, Some(6.0)]));
+        assert_eq!(of_those(vec![None], evaluate), Some(vec![None]));
+        assert_eq!(of_those(vec![Some(1.0), None], |_| None), None);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The diagnosis, from flights to the result.
 
-use crate::compare::{self, ChannelId};
+use crate::compare::{self, ChannelId, unpredicted};
 use crate::diagnose::answer::advice;
 use crate::diagnose::answer::decoys;
 use crate::diagnose::answer::impossible::impossible;
@@ -14,6 +14,7 @@ use crate::diagnose::answer::shares;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::options::{Detail, Options};
 use crate::diagnose::regression::catalogue;
+use crate::diagnose::regression::local::CHANNELS;
 use crate::diagnose::regression::sensors;
 use crate::diagnose::regression::shared;
 use crate::diagnose::search::excitation;
@@ -24,6 +25,7 @@ use crate::per_flight::known::{put_right, trimmed};
 use crate::progress::{Progress, report};
 use crate::rudder;
 use crate::weak_form::prepared::Prepared;
+use crate::weak_form::windows::{self, Series};
 use greylag_model::{GreyBox, RUDDER};
 use greylag_physics as physics;
 
@@ -88,6 +90,7 @@ fn of_unknown(
     known(&options.without)?;
     known(&options.with)?;
     let (problem, used, mut notes) = problem(model, flights, options)?;
+    notes.extend(predicted(model, &loads(model, &problem.flights))?);
     notes.extend(excitation::check(&problem.flights)?);
     let found = search(&problem, model, options, progress)?;
     let mut found = against_axes(problem, model, options, progress, found)?;
@@ -137,6 +140,32 @@ fn of_unknown(
         notes,
         settings: settings(options),
     })
+}
+
+/// Measured and predicted forces and moments of `flights`.
+fn loads(model: &GreyBox, flights: &[Prepared]) -> Vec<Vec<Series>> {
+    let is_load = |s: &Series| ChannelId::ALL[..CHANNELS].contains(&s.channel);
+    let of = |flight: &Prepared| -> Vec<Series> {
+        windows::channels(model, flight).into_iter().filter(is_load).collect()
+    };
+    flights.iter().map(of).collect()
+}
+
+/// A note on the windows of `series` in which `model` predicts no number; `None` if there are none.
+///
+/// # Errors
+/// The model predicts no number in any window of a measured channel, which would then count as explained.
+fn predicted(model: &GreyBox, series: &[Vec<Series>]) -> Result<Option<String>, DiagnoseError> {
+    let lost = |channel: &ChannelId| {
+        let own = series.iter().flatten().filter(|s| s.channel == *channel);
+        let pairs = own.flat_map(|s| s.measured.iter().zip(&s.predicted));
+        let mut measured = pairs.filter(|(measured, _)| measured.is_finite()).peekable();
+        measured.peek().is_some() && measured.all(|(_, predicted)| !predicted.is_finite())
+    };
+    match ChannelId::ALL.iter().any(lost) {
+        true => Err(DiagnoseError::Unusable { model: model.name.clone() }),
+        false => Ok(unpredicted(series)),
+    }
 }
 
 fn settings(options: &Options) -> Settings {
@@ -284,4 +313,29 @@ pub fn verdict(found: &Found) -> Verdict {
 /// Ids of the candidate effects that a model lacks and that can be searched for.
 pub fn searched(model: &GreyBox, without: &[String]) -> Vec<&'static str> {
     catalogue::candidates(model, &[], without).iter().map(|e| e.about.id).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn windows_without_a_prediction_are_noted_and_a_channel_without_any_is_refused() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
+        let model = GreyBox::load(&path).unwrap();
+        let series = |channel, predicted: [f64; 2]| Series {
+            channel,
+            measured: vec![1.0, 2.0],
+            predicted: predicted.to_vec(),
+            noise_variance: 0.0,
+        };
+        let whole = series(ChannelId::Roll, [1.0, 2.0]);
+        assert_eq!(predicted(&model, &[vec![whole.clone()]]).unwrap(), None);
+        let part = vec![whole.clone(), series(ChannelId::Lift, [1.0, f64::NAN])];
+        let note = predicted(&model, &[part]).unwrap().unwrap();
+        assert!(note.ends_with("lift 1 of 2."), "{note}");
+        let none = vec![whole, series(ChannelId::Lift, [f64::NAN; 2])];
+        assert!(matches!(predicted(&model, &[none]), Err(DiagnoseError::Unusable { .. })));
+    }
 }

@@ -250,19 +250,23 @@ fn asserted(c: &Candidate) -> String {
     );
     if !c.indistinguishable_from.is_empty() {
         let separate = describe(&c.id).and_then(|a| a.entry).map_or("", |e| e.separated_by);
-        text += &alike(&c.indistinguishable_from.join(" or "), separate);
+        text += &alike(&c.indistinguishable_from, separate);
     }
     text
 }
 
 /// Sentence on the effects `others` that may be the cause as well, with the manoeuvres `separate` that would decide. An
-/// effect file need not state such manoeuvres.
-fn alike(others: &str, separate: &str) -> String {
-    let fly = match separate {
+/// effect file need not state such manoeuvres. No manoeuvre decides between an effect and misaligned axes.
+fn alike(others: &[String], separate: &str) -> String {
+    let decides = match separate {
+        _ if others.iter().all(|id| id == askew::ID) => format!("; to see, {AXES}"),
         "" => String::new(),
         manoeuvres => format!("; to be sure, fly {manoeuvres}"),
     };
-    format!(" It could also be {others}: these data cannot tell them apart{fly}.")
+    format!(
+        " It could also be {}: these data cannot tell them apart{decides}.",
+        others.join(" or ")
+    )
 }
 
 /// Phrase for the error that a flexible model could remove; empty if it does not exceed chance.
@@ -341,8 +345,14 @@ mod tests {
 
     #[test]
     fn only_stated_manoeuvres_are_to_be_flown() {
-        let said = alike("mass or inertia", "");
+        let said = alike(&["mass".into(), "inertia".into()], "");
         assert_eq!(said, " It could also be mass or inertia: these data cannot tell them apart.");
-        assert!(alike("mass", "fast rolls").ends_with("apart; to be sure, fly fast rolls."));
+        assert!(
+            alike(&["mass".into()], "fast rolls").ends_with("apart; to be sure, fly fast rolls.")
+        );
+        let axes = alike(&[askew::ID.into()], "fast rolls");
+        assert!(
+            axes.ends_with("apart; to see, amend with --axes-askew 3, or mount the board anew.")
+        );
     }
 }

@@ -230,15 +230,20 @@ fn project(
 }
 
 fn block_grams(cells: &Cells, rows: &[DMatrix<f64>], ny: usize) -> Vec<DMatrix<f64>> {
-    (0..cells.blocks())
-        .into_par_iter()
-        .map(|block| {
+    // cell, first row and last row + 1 of the parts of each block, in the order of the cells
+    let mut parts: Vec<Vec<(usize, usize, usize)>> = vec![Vec::new(); cells.blocks()];
+    for (k, cell) in cells.list.iter().enumerate() {
+        for (block, from, to) in cell.rows_of_blocks() {
+            parts[block].push((k, from, to));
+        }
+    }
+    parts
+        .par_iter()
+        .map(|parts| {
             let mut gram = DMatrix::zeros(ny, ny);
-            for (cell, rows) in cells.list.iter().zip(rows) {
-                for (_, from, to) in cell.rows_of_blocks().iter().filter(|(b, _, _)| *b == block) {
-                    let part = rows.rows(*from, to - from);
-                    gram.gemm_tr(1.0, &part, &part, 1.0);
-                }
+            for (k, from, to) in parts {
+                let part = rows[*k].rows(*from, to - from);
+                gram.gemm_tr(1.0, &part, &part, 1.0);
             }
             gram
         })
@@ -273,4 +278,32 @@ fn noise_products(
         }
     }
     products
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::regression::cells::Cell;
+
+    #[test]
+    fn the_products_of_a_block_are_those_of_its_rows_in_all_cells() {
+        let cell = |channel: usize, blocks: &[usize]| Cell {
+            flight: 0,
+            channel,
+            windows: (0..blocks.len()).collect(),
+            runs: vec![blocks.len()],
+            blocks: blocks.to_vec(),
+        };
+        let list = vec![cell(0, &[0, 0, 1, 1, 0]), cell(3, &[1, 1, 2])];
+        let cells = Cells { list, flight_of_block: vec![0; 3] };
+        let rows = [5, 3].map(|n| DMatrix::from_fn(n, 2, |i, j| 1.0 + (3 * i + 7 * j + n) as f64));
+        let grams = block_grams(&cells, &rows, 2);
+        let product = |of: &[(usize, usize)]| {
+            let of = of.iter().map(|(k, row)| rows[*k].row(*row).transpose() * rows[*k].row(*row));
+            of.fold(DMatrix::<f64>::zeros(2, 2), |sum, product| sum + product)
+        };
+        assert_eq!(grams[0], product(&[(0, 0), (0, 1), (0, 4)]));
+        assert_eq!(grams[1], product(&[(0, 2), (0, 3), (1, 0), (1, 1)]));
+        assert_eq!(grams[2], product(&[(1, 2)]));
+    }
 }
