@@ -113,10 +113,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         files::writable(path, overwrite)?;
     }
     let places = Places::new(&path, &model, &arguments.out, overwrite)?;
-    distinct(&arguments.logs.paths, &arguments.hold_out)?;
-    if !arguments.per_flight.asked().constants().is_empty() {
-        distinct_names(arguments.logs.paths.iter().chain(&arguments.hold_out))?;
-    }
+    arguments.check_logs()?;
     let effects = named_effects(&arguments.effects)?;
     check_new(&effects, &model)?;
     let (paths, held) = divided(arguments);
@@ -162,6 +159,17 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     print_summary(&answer);
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
+}
+
+impl Arguments {
+    /// Refuses a log that is named twice and, for constants of single flights, two logs of one file name.
+    fn check_logs(&self) -> Result<()> {
+        distinct(&self.logs.paths, &self.hold_out)?;
+        match self.per_flight.asked().constants().is_empty() {
+            true => Ok(()),
+            false => distinct_names(self.logs.paths.iter().chain(&self.hold_out)),
+        }
+    }
 }
 
 /// The reason why the fit is not written, in a sentence; `None` if it is written. With `--fit-all` no flight is held
