@@ -7,6 +7,7 @@ use anyhow::Result;
 use comfy_table::Table;
 
 use crate::commands::bar::Bar;
+use crate::commands::distinct::distinct;
 use crate::commands::files;
 use crate::commands::given;
 use crate::commands::intake::{Intake, LogArguments};
@@ -84,6 +85,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         true => ActuatorClock::AsRecorded,
         false => ActuatorClock::Estimated,
     };
+    distinct(&arguments.logs.paths, &[])?;
     let Intake { flights, mut notes, mut in_doubt } = arguments.logs.take_in(&models[0], clock)?;
     let options = Options { horizons_s: arguments.horizons.clone(), seed: arguments.seed };
     let bar = Bar::new();

@@ -88,6 +88,7 @@ const KEPT: [Mistake; 9] = [
         1,
         &["model.toml", "another folder"],
     ),
+    ("compare --model @/model.toml --log @/good.csv @/good.csv", 1, &["same flight", "once"]),
     (
         "amend --model @/model.toml --log @/good.csv @/good.csv --tune-only --out @/new",
         1,
