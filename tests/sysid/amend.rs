@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use crate::amend_support::{Manoeuvres, errors, flight, fly, off, sensors};
-use greylag::logs::csv;
+use crate::amend_support::{Manoeuvres, flight, off, sensors};
+use crate::lagging_support::{LAGGING, Lagging, MODEL};
 use greylag::model::{GreyBox, Integrator};
 use greylag::sysid::amend::{Added, AmendError, Options, Prior, amend};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
@@ -14,7 +14,7 @@ fn added(id: &str) -> Options {
 }
 
 fn flights(hidden: &str, first: u64) -> Vec<Reconstruction> {
-    (first..first + 3).map(|k| flight(hidden, 30.0, Manoeuvres::Usual, k)).collect()
+    (first..first + 3).map(|k| flight(hidden, 22.0, Manoeuvres::Usual, k)).collect()
 }
 
 #[test]
@@ -157,21 +157,21 @@ fn validate_the_prior_as_printed_ends_close_to_the_simulators_model() {
     (printed.integrator, printed.axes) = (exact.integrator, exact.axes);
     printed.atmosphere.density = exact.atmosphere.density;
     let all: Vec<Reconstruction> =
-        (51..55).map(|k| flight("", 40.0, Manoeuvres::Stalls, k)).collect();
+        (51..54).map(|k| flight("", 40.0, Manoeuvres::Stalls, k)).collect();
     let effects =
         "inertia_xz lift_stall drag_elevator_abs drag_alpha2 drag_beta2 lift_curve".split(' ');
     let effects = effects.map(|id| Added { id: id.into(), start: None }).collect();
     let options = Options { effects, ..Options::default() };
     let found =
-        amend(&printed, &all[..3], &all[3..], &options, &greylag::sysid::progress::ignore_progress)
+        amend(&printed, &all[..2], &all[2..], &options, &greylag::sysid::progress::ignore_progress)
             .unwrap();
     let story = &found.amendment;
     story.sentences.iter().chain(&story.notes).for_each(|s| println!("{s}"));
     assert!(story.effects.iter().all(|e| e.joined), "{:?}", story.effects);
     let tuned = amend(
         &exact,
-        &all[..3],
-        &all[3..],
+        &all[..2],
+        &all[2..],
         &Options::default(),
         &greylag::sysid::progress::ignore_progress,
     )
@@ -179,9 +179,9 @@ fn validate_the_prior_as_printed_ends_close_to_the_simulators_model() {
     let least = at_5s(&tuned.amendment.after);
     println!("error {:.5}, the simulator's own model {least:.5}", at_5s(&story.after));
     assert!(at_5s(&story.after) < 0.02 * at_5s(&story.given), "{}", at_5s(&story.after));
-    // 2.7 times were measured with these three flights; seven and the curve of the drag come closer
-    // (docs/validation/diagnosis.md)
-    assert!(at_5s(&story.after) < 4.0 * least, "{} beside {least}", at_5s(&story.after));
+    // 1.3 times were measured with these two flights, and 2.7 with three, to which the simulator's model comes closer; seven
+    // and the curve of the drag come closer still (docs/validation/diagnosis.md)
+    assert!(at_5s(&story.after) < 1.7 * least, "{} beside {least}", at_5s(&story.after));
     // what the slips were
     let value = |name: &str| story.parameters.iter().find(|p| p.name == name).unwrap().value;
     assert!((value("thrust_linear.Cp_n") / 26.246 - 1.0).abs() < 0.01);
@@ -252,64 +252,46 @@ fn greylag(arguments: &[&str]) -> Output {
 
 #[test]
 fn the_command_writes_a_model_that_every_command_reads() {
-    let scratch = tempfile::tempdir().unwrap();
-    let at = |name: &str| scratch.path().join(name).to_str().unwrap().to_owned();
-    for k in 0..2 {
-        let flown = fly("actuator_lag=0.05", 25.0, Manoeuvres::Usual, 20 + k);
-        let log = sensors::spoil(&flown, &errors(20 + k), k);
-        csv::save(&log, Path::new(&at(&format!("{k}.csv")))).unwrap();
-    }
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let original = root.join("params/x8/jsbsim.toml");
-    let before = std::fs::read(&original).unwrap();
-    let (a, b, out) = (at("0.csv"), at("1.csv"), at("amended"));
-    let model_file = original.to_str().unwrap();
-    let line = [
-        "amend",
-        "--model",
-        model_file,
-        "--log",
-        &a,
-        &b,
-        "--effect",
-        "actuator_lag",
-        "--out",
-        &out,
-    ];
-    let said = greylag(&line);
+    let Lagging { line, amended: said, out, model_before, .. } = &*LAGGING;
     let text = String::from_utf8_lossy(&said.stdout);
     assert!(said.status.success(), "{text}{}", String::from_utf8_lossy(&said.stderr));
     // tuning and effect apart, said once
     assert_eq!(text.matches(" with actuator_lag (another −").count(), 1, "{text}");
     assert!(!text.contains("as well the error"), "{text}");
-    assert_eq!(before, std::fs::read(&original).unwrap());
-    let written = scratch.path().join("amended/model.toml");
+    assert_eq!(*model_before, std::fs::read(MODEL).unwrap());
+    let written = out.join("model.toml");
     let amended = GreyBox::load(&written).unwrap();
     assert!(amended.has("actuator_lag") && amended.name == "jsbsim+actuator_lag");
     let toml = std::fs::read_to_string(&written).unwrap();
-    assert!(toml.contains("fitted to 0.csv (sha256 "), "{toml}");
-    let json = std::fs::read_to_string(scratch.path().join("amended/amend.json")).unwrap();
+    assert!(toml.contains("fitted to flight-0.csv (sha256 "), "{toml}");
+    let json = std::fs::read_to_string(out.join("amend.json")).unwrap();
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["schema"], "greylag.amend/1");
     assert_eq!(json["hold_out"][0]["sha256"].as_str().unwrap().len(), 64);
-    // a diagnosis that was written before is not made again; one of another model is refused
-    let diagnosis = at("diagnosis.json");
+    // nothing is overwritten unasked
+    let again = greylag(&line.iter().map(String::as_str).collect::<Vec<_>>());
+    assert_eq!(again.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&again.stderr).contains("--force"));
+}
+
+/// A diagnosis that was written before is not made again; one of another model is refused.
+#[test]
+fn the_command_takes_a_diagnosis_that_was_written_before() {
+    let scratch = tempfile::tempdir().unwrap();
+    let at = |name: &str| scratch.path().join(name).to_str().unwrap().to_owned();
+    let (diagnosis, out) = (at("diagnosis.json"), at("given"));
     let found = |model: &str| {
         let effect =
             r#"{"id":"actuator_lag","asserted":true,"parameters":[{"name":"tau_s","value":0.05}]}"#;
         let text =
             format!(r#"{{"schema":"greylag.diagnosis/1","model":"{model}","effects":[{effect}]}}"#);
         std::fs::write(&diagnosis, text).unwrap();
-        let out = at("given");
-        let line = ["amend", "--model", model_file, "--log", &a, &b, "--out", &out];
+        let [a, b] = [0, 1].map(|k| LAGGING.log(k));
+        let line = ["amend", "--model", MODEL, "--log", a, b, "--out", &out];
         greylag(&[&line[..], &["--diagnosis", &diagnosis]].concat())
     };
     let other = found("another");
     assert!(String::from_utf8_lossy(&other.stderr).contains("not of jsbsim"));
     assert!(found("jsbsim").status.success());
     assert!(GreyBox::load(&scratch.path().join("given/model.toml")).unwrap().has("actuator_lag"));
-    // nothing is overwritten unasked
-    let again = greylag(&line);
-    assert_eq!(again.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&again.stderr).contains("--force"));
 }

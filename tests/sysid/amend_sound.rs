@@ -133,7 +133,7 @@ fn bounds_are_the_users_and_free_runs_are_written() {
 #[test]
 fn leaving_out_one_flight_after_the_other_names_the_lag() {
     let mut all: Vec<Reconstruction> =
-        (61..64).map(|k| flight("actuator_lag=0.08", 25.0, Manoeuvres::Usual, k)).collect();
+        (61..64).map(|k| flight("actuator_lag=0.08", 18.0, Manoeuvres::Usual, k)).collect();
     // a flight of 0.8 s reaches no horizon: it is fitted to and never left out
     let mut short = all[0].clone();
     short.name = "short".into();

@@ -16,6 +16,7 @@ mod diagnosis_support;
 mod formula_lags;
 mod installation;
 mod lacking_support;
+mod lagging_support;
 mod per_flight;
 mod propose;
 mod reconstruct;
