@@ -57,13 +57,17 @@ pub fn plan(
     Ok(Plan { file, cells })
 }
 
-/// Checks that no other cell of the stage has the command and the inputs of `new`: copies of one result would count as several
-/// seeds or levels.
+/// Checks that no cell of the stage with another seed has the command and the inputs of `new`: copies of one result would count
+/// as several seeds. Levels with other names may have the same command.
 fn distinct(cells: &[Cell], new: &Cell) -> Result<(), String> {
-    let same = |cell: &&Cell| cell.stage == new.stage && cell.identity == new.identity;
+    let same = |cell: &&Cell| {
+        cell.stage == new.stage
+            && cell.identity == new.identity
+            && cell.levels.get("seed") != new.levels.get("seed")
+    };
     match cells.iter().find(same) {
         Some(old) => Err(format!(
-            "cells {} and {} have the same command; write {{AXIS}} into it for every axis that it varies, such as {{seed}}",
+            "cells {} and {} have the same command; write {{seed}} into it",
             old.id, new.id
         )),
         None => Ok(()),

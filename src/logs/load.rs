@@ -228,12 +228,11 @@ const NONE_OF_THEM: &str = "it begins neither like a CSV table nor a PX4 ULog, a
 /// Reads the flights of the log `source`, which begins with `start`.
 fn read(
     start: &[u8],
-    mut source: &mut dyn Read,
+    source: &mut dyn Read,
     path: &Path,
     options: &Options,
     to: Use,
 ) -> Result<Lives, LogError> {
-    let failed = |source| LogError::File { path: path.to_owned(), source };
     if start.is_empty() {
         return Err(LogError::Empty { path: path.to_owned() });
     }
@@ -250,10 +249,30 @@ fn read(
     if format == Format::Csv {
         return table(start, source, path, options, to, keep);
     }
+    let lives = decoded(format, start, source, path, options, keep)?;
+    let several = lives.len() > 1;
+    let one = |(k, mut topics): (usize, Topics)| {
+        topics.align();
+        let name = if several { format!("{}#{}", name(path), k + 1) } else { name(path) };
+        binary::read(format, topics, &name, path, options, to)
+    };
+    Ok(lives.into_iter().enumerate().map(one).collect())
+}
+
+/// Decodes the topics of each flight of a log that is no table.
+fn decoded(
+    format: Format,
+    start: &[u8],
+    mut source: &mut dyn Read,
+    path: &Path,
+    options: &Options,
+    keep: Keep,
+) -> Result<Vec<Topics>, LogError> {
+    let failed = |source| LogError::File { path: path.to_owned(), source };
     let wanted = |topic: &str| options.mapping.wants(format, topic);
     let fields = |topic: &str, field: &str| options.mapping.wants_field(format, topic, field);
     let narrow;
-    let mut decoded;
+    let mut narrowed;
     let mut text_log;
     let (lives, window): (Vec<Topics>, _) = match format {
         Format::Ulog => {
@@ -262,8 +281,8 @@ fn read(
         }
         Format::Dataflash if door::is_wide(start) => {
             narrow = decode(source).map_err(failed)?;
-            decoded = &narrow[..];
-            text_log = Binary::new(&mut decoded);
+            narrowed = &narrow[..];
+            text_log = Binary::new(&mut narrowed);
             dataflash::read(&mut text_log, &wanted, keep)
         }
         Format::Dataflash if !start.starts_with(&DATAFLASH_MAGIC) => {
@@ -286,13 +305,7 @@ fn read(
     if format == Format::Dataflash && lives.iter().all(Topics::of_sdlog2) {
         return Err(LogError::Foreign { path: path.to_owned(), what: foreign::SDLOG2 });
     }
-    let several = lives.len() > 1;
-    let one = |(k, mut topics): (usize, Topics)| {
-        topics.align();
-        let name = if several { format!("{}#{}", name(path), k + 1) } else { name(path) };
-        binary::read(format, topics, &name, path, options, to)
-    };
-    Ok(lives.into_iter().enumerate().map(one).collect())
+    Ok(lives)
 }
 
 /// Reads the flights of a table.

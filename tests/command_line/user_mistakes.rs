@@ -71,7 +71,7 @@ const FILES: [Mistake; 22] = [
     ),
 ];
 
-const KEPT: [Mistake; 9] = [
+const KEPT: [Mistake; 10] = [
     (
         "compare --model @/model.toml --log @/good.csv --json @/there.json",
         1,

@@ -85,11 +85,13 @@ fn derivatives_are_estimated_in_flight() {
             errors.push((found / own[*place] - 1.0).abs());
         }
     }
-    for (errors, what) in errors.iter().zip(["roll power", "roll damping", "pitch power"]) {
+    // medians of 300 aircraft: 10, 18 and 5 % (docs/explanation/planner.md); those of 30 vary by a third
+    let bounds = [("roll power", 0.2), ("roll damping", 0.35), ("pitch power", 0.1)];
+    for (errors, (what, most)) in errors.iter().zip(bounds) {
         let known: Vec<f64> = errors.iter().copied().filter(|e| e.is_finite()).collect();
         println!("{what}: {} of {}, median {:.3}", known.len(), errors.len(), median(&known));
         assert!(known.len() * 10 >= errors.len() * 9, "{what}: {errors:?}");
-        assert!(median(&known) < 0.1, "{what}: {known:?}");
+        assert!(median(&known) < most, "{what}: {known:?}");
     }
 }
 
