@@ -9,21 +9,7 @@ pub fn error(n: &Numbers) -> String {
     };
     let mut text = format!("{} the error at {} s", on(n), number(n.horizon_s));
     if rest.is_empty() {
-        text += &format!(" is {}", number(first.error));
-        if let Some(b) = &n.baseline {
-            let beside = if number(b.error) == number(first.error) {
-                "equal to"
-            } else if b.error < first.error {
-                "worse than"
-            } else {
-                "better than"
-            };
-            text += &format!(
-                ", {beside} the best forecast without aerodynamics ({}), {}",
-                b.name,
-                number(b.error)
-            );
-        }
+        text += &beside_baseline(n, first.error);
         return text + ".";
     }
     let mut last = None;
@@ -66,6 +52,21 @@ pub fn error(n: &Numbers) -> String {
         text += ": tuning does not help";
     }
     text + "."
+}
+
+/// The error of a single model, beside that of the best forecast without aerodynamics.
+fn beside_baseline(n: &Numbers, error: f64) -> String {
+    let text = format!(" is {}", number(error));
+    let Some(b) = &n.baseline else { return text };
+    let beside = if number(b.error) == number(error) {
+        "equal to"
+    } else if b.error < error {
+        "worse than"
+    } else {
+        "better than"
+    };
+    let best = number(b.error);
+    format!("{text}, {beside} the best forecast without aerodynamics ({}), {best}", b.name)
 }
 
 /// Sentences on the effects with their most significant coefficients, and on the state whose prediction improves most.
