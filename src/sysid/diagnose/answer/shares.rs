@@ -108,7 +108,7 @@ mod tests {
         let point = |k: usize| {
             let mut regime = [0.0; RegimeVariable::CONTINUOUS.len()];
             regime[0] = k as f64;
-            (regime, if k % 2 == 0 { 0.1 } else { -0.1 })
+            (regime, if k.is_multiple_of(2) { 0.1 } else { -0.1 })
         };
         assert_eq!(worst_of((0..21).map(point).collect(), 1), None);
         let off = (0..40).map(|k| (point(k).0, 3.0 + point(k).1)).collect();
