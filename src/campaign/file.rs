@@ -68,7 +68,7 @@ impl From<LevelFile> for Level {
     }
 }
 
-/// A stage: one command, run for every combination of the levels of its axes.
+/// A stage: one command, run for every combination of the levels of its axes. One such run is a cell.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StageFile {

@@ -112,7 +112,7 @@ impl Notice {
     }
 }
 
-/// A connection to a vehicle with one of the profiles.
+/// The link to the simulator or to a flight controller.
 #[expect(clippy::large_enum_variant, reason = "a program has one of them, or two")]
 #[derive(Clone, Debug)]
 pub enum Vehicle {
@@ -153,7 +153,8 @@ impl Vehicle {
         }
     }
 
-    /// Excludes `missed`, a stall of this computer, from all timeouts. Frames of that time may still arrive.
+    /// Excludes `missed`, a stall of this computer, from all timeouts. Frames sent during the stall may still be in the
+    /// receive buffer.
     pub fn excuse(&mut self, missed: Duration) {
         match self {
             Vehicle::Sitl(_) => {}

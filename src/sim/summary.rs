@@ -1,4 +1,4 @@
-//! Summary of quality measures over many flights: median with interval, and the worst. Samples of long series.
+//! Summary of quality measures over many flights: median with interval, and the worst. Decimation of long series.
 
 use std::collections::BTreeMap;
 

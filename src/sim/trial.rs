@@ -20,7 +20,7 @@ use greylag_physics::airframe::Reference;
 
 /// Stream of the wind.
 const WIND: u64 = 82;
-/// Strongest steady wind at the cruise airspeed for which the flights are written, m/s. It is a third of that airspeed.
+/// Largest steady wind for an aircraft that cruises at `CRUISE_MPS`, m/s. It is scaled in proportion to the cruise airspeed.
 const WIND_MAX_MPS: f64 = 6.0;
 /// Wind 20 ft above ground of light turbulence, m/s (MIL-F-8785C).
 const LIGHT_20FT_MPS: f64 = 7.6;
@@ -28,7 +28,8 @@ const LIGHT_20FT_MPS: f64 = 7.6;
 /// The aircraft of a trial.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// The simulator's aircraft with its initial state and held properties. The trial sets air and hidden effects.
+    /// The simulated aircraft: its initial state, and the JSBSim properties that are held constant. The trial adds wind,
+    /// turbulence and hidden effects.
     pub plant: PlantOptions,
     /// Cruise airspeed, m/s.
     pub cruise: f64,
@@ -41,7 +42,7 @@ impl Subject {
     ///
     /// # Errors
     ///
-    /// If the simulator cannot move its surfaces.
+    /// If some surfaces of `airframe` have a JSBSim position property and others have none.
     pub fn new(mut plant: PlantOptions, airframe: &Airframe) -> Result<Subject, String> {
         describe(&mut plant, airframe)?;
         let Reference { airspeed, altitude } = airframe.reference;
@@ -93,11 +94,11 @@ pub struct Logs {
 
 impl Trial {
     /// Flies the training and the test flights of the seed under `controller`. The excitation is reduced where the
-    /// aircraft would leave its bounds. Instruments are drawn for the log of each flight.
+    /// aircraft would leave its bounds. Sensor errors are drawn anew for each flight.
     ///
     /// # Errors
     ///
-    /// If the aircraft cannot be built, or leaves its bounds.
+    /// If the aircraft cannot be built, or leaves its bounds even with the smallest excitation.
     pub fn fly(&self, controller: &dyn Controller) -> Result<Logs, FlightTestError> {
         let training = self.training(controller)?;
         let testing = flights::testing(self.seed);

@@ -204,7 +204,7 @@ fn a_file_that_states_no_stall_has_no_limit_of_it() {
     assert_eq!(limits.load_factor[0], f64::NEG_INFINITY);
 }
 
-/// A log without attitude, or without it at the start, must not look like one that was on the target at once.
+/// If attitude is missing at the start of a log, the settling time must be NaN, not zero.
 #[test]
 fn an_unknown_attitude_has_no_settling_time() {
     let unknown = |t: f64| Moment { attitude: [f64::NAN; 2], ..level(t) };

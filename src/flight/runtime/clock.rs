@@ -99,7 +99,7 @@ mod tests {
         }
         // Half a second after the patience has ended, vehicle time is half a second ahead: the link counts as lost.
         assert_eq!(clock.at(later(1700)), time(5500));
-        // In a stall of five seconds the companion did not observe five seconds of silence.
+        // A stall of five seconds adds only `LISTENED` of silence.
         assert_eq!(clock.at(later(6700)), time(5600));
         clock.set(later(6700), time(5010));
         assert_eq!(clock.at(later(9000)), time(5010));

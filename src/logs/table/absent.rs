@@ -4,8 +4,8 @@ use crate::finding::Finding;
 use crate::mapping::TEXT;
 use crate::mapping::rule::Rule;
 
-/// Finding on those of the rules `without` data that the user's mapping names; `None` if there are none. A rule for tables says
-/// nothing of other logs.
+/// A warning that lists the rules of the user's mapping for which the log has no data; `None` if there is no such rule.
+/// `without` holds all rules without data. Rules for CSV columns are skipped.
 pub(super) fn finding(without: &[&Rule]) -> Option<Finding> {
     let own = without.iter().filter(|rule| rule.own && rule.topic != TEXT);
     let named: Vec<String> =

@@ -27,7 +27,7 @@ pub fn shipped() -> &'static [Written] {
     &SHIPPED
 }
 
-/// The effect `id` of the file that was read last, or else of a shipped file. `None` if there is no such effect.
+/// The most recently read effect with this id, otherwise the shipped one. `None` if there is no such effect.
 pub fn find(id: &str) -> Option<&'static Written> {
     let read = READ.read().unwrap_or_else(PoisonError::into_inner);
     let own = read.iter().rev().copied().find(|effect| effect.about.id == id);

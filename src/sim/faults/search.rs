@@ -46,7 +46,7 @@ pub struct Nearest {
 }
 
 /// Flies `scenario`. Returns for each rule the smallest robustness and the time at which it occurred, s; `None` if the rule
-/// does not apply to the counterpart. A panic violates all applicable rules.
+/// does not apply to the simulated vehicle (`Counterpart`). A panic violates all applicable rules.
 ///
 /// # Errors
 ///

@@ -220,8 +220,8 @@ fn spill<const M: usize, const W: usize>(row: &mut [f64; W], part: &[f64; M]) {
     row[W - 1] += part[M - 1];
 }
 
-/// Derivatives of every channel with respect to the path at sample `k` and to the constants. `None` for a channel without
-/// information.
+/// Derivatives of every channel with respect to the path at sample `k` and to the constants. `None` for a singular
+/// channel: Euler angles near vertical pitch, air data at low airspeed.
 fn slopes<const N: usize, const M: usize>(
     path: &Path,
     k: usize,

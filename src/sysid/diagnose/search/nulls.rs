@@ -70,7 +70,8 @@ mod tests {
 
     #[test]
     fn the_threshold_of_known_maxima() {
-        // the maximum of 20 chi-square-like draws E = −2 ln U: its 99 % quantile is −2 ln(1 − 0.99^(1/20))
+        // the maximum of 20 draws E = −2 ln U (chi-square, two degrees of freedom):
+        // its 99 % quantile is −2 ln(1 − 0.99^(1/20))
         let exact = -2.0 * (1.0 - 0.99_f64.powf(1.0 / 20.0)).ln();
         let mut random = stream(5, &[]);
         let mut largest =

@@ -23,7 +23,7 @@ use greylag_num::statistics::mean;
 const NAMES: [&str; 9] = ["α", "β", "V", "p", "q", "r", "δa", "δe", "throttle"];
 /// Number of squares and pairwise products.
 const PRODUCTS: usize = NAMES.len() * (NAMES.len() + 1) / 2;
-/// Second derivatives of the deflections: in these terms, a lag differs from a delay.
+/// Second derivatives of the deflections. A first-order lag and a pure delay agree to first order and differ in these.
 const BENT: [&str; 2] = ["δa″", "δe″"];
 /// Number of terms of a channel.
 const TERMS: usize = PRODUCTS + BENT.len();
