@@ -178,7 +178,7 @@ fn design(model: &str, pair: &[String; 2], words: &BTreeMap<String, String>) -> 
     format!("greylag design --model {model} --between {a} {b}")
 }
 
-/// The command that fits misaligned axes in place of an effect that cannot be told from them.
+/// The command that fits misaligned axes in place of an effect that cannot be distinguished from them.
 fn turned(model: &str, logs: &str, out: &str) -> String {
     format!("greylag amend --model {model}{logs} --tune-only --axes-askew 3 --out {out}")
 }
@@ -188,7 +188,7 @@ fn in_doubt(diagnosis: &Diagnosis) -> bool {
     alike(diagnosis).next().is_some()
 }
 
-/// What the asserted effects cannot be told from.
+/// Identifiers of the explanations that cannot be distinguished from the asserted effects.
 fn alike(diagnosis: &Diagnosis) -> impl Iterator<Item = &String> {
     diagnosis.effects.iter().filter(|c| c.asserted).flat_map(|c| &c.indistinguishable_from)
 }
