@@ -11,26 +11,29 @@
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{ActuatorState, Airframe, State, Time};
 
-/// Names of the estimates, in the order of [`AircraftEstimator::derivatives`]: the dimensional derivatives L_δa, L_p, M_δe, M_q
-/// and M_α at the cruise airspeed.
-pub const DERIVATIVES: [&str; 5] = ["L_da", "L_p", "M_de", "M_q", "M_a"];
+/// Names of the estimates, in the order of [`AircraftEstimator::derivatives`]: the dimensional derivatives L_δa, L_p, M_δe and
+/// M_α at the cruise airspeed. M_q is estimated with them and not given: flights in closed loop hardly determine it beside M_α
+/// (`docs/explanation/planner.md`).
+pub const DERIVATIVES: [&str; 4] = ["L_da", "L_p", "M_de", "M_a"];
 
-/// Number of terms of each axis.
-const TERMS: usize = 7;
-/// Prior means and standard deviations of the coefficients of roll and pitch, dimensionless by V/g at the cruise airspeed V. The
-/// first rows are medians and spreads of drawn aircraft (`greylag aircraft draw`). The order is that of [`terms`].
+/// Number of terms of each axis that depend on controls, and of those that depend on the motion alone.
+const CONTROLS: usize = 2;
+const MOTION: usize = 5;
+const TERMS: usize = CONTROLS + MOTION;
+/// Prior means and standard deviations of the coefficients of roll and pitch, dimensionless by V/g at the cruise airspeed V. Those of
+/// control power, damping and stiffness are medians and spreads of drawn aircraft (`greylag aircraft draw`). The order is that
+/// of [`of_controls`], then that of [`of_motion`].
 const PRIORS: [[[f64; TERMS]; 2]; 2] = [
-    [[200.0, 15.0, 0.0, 0.0, 0.0, 0.0, 0.0], [250.0, 10.0, 300.0, 20.0, 1.0, 30.0, 1.0]],
-    [[150.0, 10.0, 40.0, 0.0, 0.0, 0.0, 0.0], [200.0, 7.0, 50.0, 30.0, 1.0, 30.0, 1.0]],
+    [[200.0, 0.0, 15.0, 0.0, 0.0, 0.0, 0.0], [250.0, 30.0, 10.0, 300.0, 20.0, 1.0, 1.0]],
+    [[150.0, 0.0, 10.0, 40.0, 0.0, 0.0, 0.0], [200.0, 30.0, 7.0, 50.0, 30.0, 1.0, 1.0]],
 ];
 /// Corner frequency of the low-pass filters on both sides of the regression, rad/s.
 const CORNER: f64 = 10.0;
 /// Standard deviation of the regression's error, 1/s². Its product with V/g (s) has the unit of the regression's left side.
 const NOISE: f64 = 4.0;
-/// Delays of the controls that are tried, in samples.
+/// Delays of the controls that are tried, in samples, the longest last.
 const DELAYS: [usize; 4] = [0, 2, 4, 6];
-/// Largest delay, in samples.
-const LONGEST: usize = 6;
+const LONGEST: usize = DELAYS[DELAYS.len() - 1];
 /// Time constant of the mean square error that compares the delays, s.
 const FORGETTING_S: f64 = 20.0;
 /// Growth rate of each variance by forgetting, as a fraction of the prior variance, 1/s.
@@ -50,23 +53,36 @@ pub struct AircraftEstimator {
     cruise: f64,
     /// Full travel of aileron, elevator and rudder, rad; infinite for an aircraft without a rudder.
     travel: [f64; 3],
-    /// Regressions of roll and pitch, one for each of [`DELAYS`].
-    axes: [[Axis; DELAYS.len()]; 2],
-    /// Controls over their travels, the newest first.
-    controls: [[f64; 4]; LONGEST + 1],
+    /// Roll and pitch.
+    axes: [Axis; 2],
+    /// Controls over their travels, the newest first; `None` before the first sample and after an interruption.
+    controls: Option<[[f64; 4]; LONGEST + 1]>,
     last: Option<Time>,
 }
 
-/// The regression of one axis with one delay.
+/// The regressions of one axis, one for each of [`DELAYS`], with their common filters.
 #[derive(Clone, Debug)]
 struct Axis {
+    regressions: [Regression; DELAYS.len()],
+    filters: Option<Filters>,
+}
+
+/// Filters of the signals of one axis.
+#[derive(Clone, Copy, Debug)]
+struct Filters {
+    rate: Filter,
+    motion: [Filter; MOTION],
+    controls: [[Filter; CONTROLS]; DELAYS.len()],
+}
+
+/// Recursive least squares with a prior.
+#[derive(Clone, Debug)]
+struct Regression {
     prior_sd: [f64; TERMS],
     theta: [f64; TERMS],
     covariance: [[f64; TERMS]; TERMS],
     /// Low-passed square of the error before each update.
     error: f64,
-    /// Filters of the rate and of the terms; `None` before the first sample and after an interruption.
-    filters: Option<[Filter; TERMS + 1]>,
 }
 
 /// The derivative of a signal behind two first-order lags.
@@ -77,36 +93,75 @@ struct Filter {
 }
 
 impl Filter {
-    /// Takes a further sample `x`, `step` seconds after the previous one.
-    fn take(&mut self, x: f64, step: f64) {
+    fn at(low: f64) -> Filter {
+        Filter { low, slope: 0.0 }
+    }
+
+    /// Takes a further sample `x`, `step` seconds after the previous one. Returns the filtered derivative before and after it.
+    fn take(&mut self, x: f64, step: f64) -> [f64; 2] {
+        let before = self.slope;
         self.low += step * CORNER * (x - self.low);
         self.slope += step * CORNER * (CORNER * (x - self.low) - self.slope);
+        [before, self.slope]
     }
 }
 
+fn middle([before, after]: [f64; 2]) -> f64 {
+    0.5 * (before + after)
+}
+
 impl Axis {
-    fn new([mean, sd]: [[f64; TERMS]; 2]) -> Axis {
-        let mut covariance = [[0.0; TERMS]; TERMS];
-        (0..TERMS).for_each(|k| covariance[k][k] = sd[k] * sd[k]);
-        Axis { prior_sd: sd, theta: mean, covariance, error: 0.0, filters: None }
+    fn new(prior: [[f64; TERMS]; 2]) -> Axis {
+        Axis { regressions: std::array::from_fn(|_| Regression::new(prior)), filters: None }
     }
 
-    /// Updates with the rate and the terms of one sample. `time` is V/g at the cruise airspeed, s.
-    fn see(&mut self, rate: f64, terms: &[f64; TERMS], time: f64, step: f64) {
-        let signals: [f64; TERMS + 1] =
-            std::array::from_fn(|k| if k == 0 { rate } else { terms[k - 1] });
-        if !signals.iter().all(|x| x.is_finite()) {
+    /// Updates with the body rate (rad/s), the terms of the motion, and those of the controls for each delay. `time` is V/g
+    /// at the cruise airspeed, s. Values that are not finite restart the filters.
+    fn see(
+        &mut self,
+        rate: f64,
+        motion: &[f64; MOTION],
+        controls: &[[f64; CONTROLS]; DELAYS.len()],
+        [time, step]: [f64; 2],
+    ) {
+        let mut all = motion.iter().chain(controls.iter().flatten()).chain([&rate]);
+        if !all.all(|x| x.is_finite()) {
             return self.filters = None;
         }
         let Some(filters) = &mut self.filters else {
-            return self.filters = Some(signals.map(|low| Filter { low, slope: 0.0 }));
+            let controls = controls.map(|terms| terms.map(Filter::at));
+            let (rate, motion) = (Filter::at(rate), motion.map(Filter::at));
+            return self.filters = Some(Filters { rate, motion, controls });
         };
-        let before = filters.map(|filter| filter.slope);
-        filters.iter_mut().zip(signals).for_each(|(filter, x)| filter.take(x, step));
         // the difference of two rates is the acceleration in the middle between them
-        let x = std::array::from_fn(|k| 0.5 * (filters[k + 1].slope + before[k + 1]));
-        let y = (filters[0].slope - before[0]) / step * time * time;
-        self.learn(&x, y, NOISE * time, step);
+        let [before, after] = filters.rate.take(rate, step);
+        let y = (after - before) / step * time * time;
+        let motion: [f64; MOTION] =
+            std::array::from_fn(|k| middle(filters.motion[k].take(motion[k], step)));
+        for (d, regression) in self.regressions.iter_mut().enumerate() {
+            let own = &mut filters.controls[d];
+            let own: [f64; CONTROLS] =
+                std::array::from_fn(|k| middle(own[k].take(controls[d][k], step)));
+            let x = std::array::from_fn(|k| match k {
+                0..CONTROLS => own[k],
+                _ => motion[k - CONTROLS],
+            });
+            regression.learn(&x, y, NOISE * time, step);
+        }
+    }
+
+    /// The regression with the delay that explains the flight best.
+    fn best(&self) -> &Regression {
+        let all = &self.regressions;
+        all.iter().min_by(|a, b| a.error.total_cmp(&b.error)).unwrap_or(&all[0])
+    }
+}
+
+impl Regression {
+    fn new([mean, sd]: [[f64; TERMS]; 2]) -> Regression {
+        let mut covariance = [[0.0; TERMS]; TERMS];
+        (0..TERMS).for_each(|k| covariance[k][k] = sd[k] * sd[k]);
+        Regression { prior_sd: sd, theta: mean, covariance, error: 0.0 }
     }
 
     /// One step of the least squares: `y` = θ·x with an error of `noise`.
@@ -135,30 +190,27 @@ impl Axis {
     }
 }
 
-/// Terms of the roll and the pitch equation: control, damping, incidence (for roll β and the yaw rate), gyroscopic moments, trim
-/// moment by dynamic pressure, rudder or throttle. `speed` is the airspeed over the cruise airspeed, `time` V/g at cruise (s),
-/// `controls` are aileron, elevator and rudder over their travels, and the throttle.
-fn terms(s: &State, controls: [f64; 4], speed: f64, time: f64) -> [[f64; TERMS]; 2] {
-    let [aileron, elevator, rudder, throttle] = controls;
-    let (pressure, square) = (speed * speed, time * time);
-    let rate = speed * time;
+/// Terms of roll and pitch that depend on `controls`: aileron, elevator and rudder over their travels, and the throttle.
+/// `speed` is the airspeed over the cruise airspeed.
+fn of_controls(
+    [aileron, elevator, rudder, throttle]: [f64; 4],
+    speed: f64,
+) -> [[f64; CONTROLS]; 2] {
+    let pressure = speed * speed;
+    [[aileron * pressure, rudder * pressure], [-elevator * pressure, throttle]]
+}
+
+/// Terms of roll and pitch that depend on the motion: damping, then β and the yaw rate (roll), α and the trim moment (pitch), and
+/// the two gyroscopic moments. `time` is V/g at the cruise airspeed, s.
+fn of_motion(s: &State, speed: f64, time: f64) -> [[f64; MOTION]; 2] {
+    let (pressure, rate, square) = (speed * speed, speed * time, time * time);
     [
+        [-s.p * rate, s.beta * pressure, s.r * rate, s.q * s.r * square, s.p * s.q * square],
         [
-            aileron * pressure,
-            -s.p * rate,
-            s.beta * pressure,
-            s.r * rate,
-            s.q * s.r * square,
-            rudder * pressure,
-            s.p * s.q * square,
-        ],
-        [
-            -elevator * pressure,
             -s.q * rate,
             -s.alpha * pressure,
             pressure,
             s.p * s.r * square,
-            throttle,
             (s.r * s.r - s.p * s.p) * square,
         ],
     ]
@@ -176,14 +228,14 @@ impl AircraftEstimator {
                 surfaces.elevator.travel.smallest(),
                 rudder,
             ],
-            axes: PRIORS.map(|prior| std::array::from_fn(|_| Axis::new(prior))),
-            controls: [[f64::NAN; 4]; LONGEST + 1],
+            axes: PRIORS.map(Axis::new),
+            controls: None,
             last: None,
         }
     }
 
     /// Updates the estimates with a state and the deflections at `time`. After a gap in time, or a state that is not finite, the
-    /// filters restart; the estimates remain.
+    /// filters restart; the estimates remain. The function allocates no memory.
     pub fn see(&mut self, time: Time, state: &State, actuators: &ActuatorState) {
         let before = self.last.replace(time);
         let step = before.map_or(f64::NAN, |before| time.since(before).as_secs_f64());
@@ -191,47 +243,42 @@ impl AircraftEstimator {
         if !STEPS_S.contains(&step) || !SPEEDS.contains(&speed) {
             return self.interrupt();
         }
-        let scale = self.cruise / STANDARD_GRAVITY;
         let [aileron, elevator, rudder] = self.travel;
-        self.controls.rotate_right(1);
-        self.controls[0] = [
+        let now = [
             actuators.aileron / aileron,
             actuators.elevator / elevator,
             actuators.rudder / rudder,
             actuators.throttle,
         ];
-        for (k, delay) in DELAYS.into_iter().enumerate() {
-            let [roll, pitch] = terms(state, self.controls[delay], speed, scale);
-            self.axes[0][k].see(state.p, &roll, scale, step);
-            self.axes[1][k].see(state.q, &pitch, scale, step);
+        // before the first sample the controls count as constant
+        let controls = self.controls.get_or_insert([now; LONGEST + 1]);
+        controls.rotate_right(1);
+        controls[0] = now;
+        let delayed = DELAYS.map(|delay| of_controls(controls[delay], speed));
+        let scale = self.cruise / STANDARD_GRAVITY;
+        let motion = of_motion(state, speed, scale);
+        for (k, rate) in [state.p, state.q].into_iter().enumerate() {
+            let own = delayed.map(|axes| axes[k]);
+            self.axes[k].see(rate, &motion[k], &own, [scale, step]);
         }
     }
 
     /// Restarts the filters, for instance when the deflections are unknown for a while. The estimates remain.
     pub fn interrupt(&mut self) {
-        self.axes.iter_mut().flatten().for_each(|axis| axis.filters = None);
-        self.controls = [[f64::NAN; 4]; LONGEST + 1];
-    }
-
-    /// The regression of axis 0 (roll) or 1 (pitch) with the delay that explains the flight best.
-    fn best(&self, axis: usize) -> &Axis {
-        let all = &self.axes[axis];
-        all.iter().min_by(|a, b| a.error.total_cmp(&b.error)).unwrap_or(&all[0])
+        self.axes.iter_mut().for_each(|axis| axis.filters = None);
+        self.controls = None;
     }
 
     /// The dimensional derivatives at the cruise airspeed, in the order of [`DERIVATIVES`]: L_δa and M_δe in rad/s² at full
-    /// deflection (L_δa is positive, M_δe negative), L_p and M_q in 1/s, M_α in 1/s². NaN if the standard deviation of the
-    /// estimate is above 0.3 of the prior's.
+    /// deflection (L_δa is positive, M_δe negative), L_p in 1/s, M_α in 1/s². NaN if the flight does not determine the value: its
+    /// standard deviation is above 0.3 of the prior's.
     pub fn derivatives(&self) -> [f64; DERIVATIVES.len()] {
         let time = self.cruise / STANDARD_GRAVITY;
-        let [roll, pitch] = [self.best(0), self.best(1)];
-        [
-            roll.known(0) / (time * time),
-            -roll.known(1) / time,
-            -pitch.known(0) / (time * time),
-            -pitch.known(1) / time,
-            -pitch.known(2) / (time * time),
-        ]
+        let [roll, pitch] = self.axes.each_ref().map(Axis::best);
+        let square = time * time;
+        let damping = -roll.known(CONTROLS) / time;
+        let stiffness = -pitch.known(CONTROLS + 1) / square;
+        [roll.known(0) / square, damping, -pitch.known(0) / square, stiffness]
     }
 }
 
@@ -239,35 +286,40 @@ impl AircraftEstimator {
 mod tests {
     use super::*;
 
-    /// The true control power is 120, the true damping 12. The constant moment is not among the regressors.
+    /// The rate obeys a power of 120, a damping of 12 and a constant trim moment, and follows the control after 40 ms.
     #[test]
-    fn control_power_and_damping_are_found_without_bias() {
+    fn control_power_and_damping_are_found_beside_a_delay() {
         let (time, step, truth) = (2.0, 0.01, [120.0, 12.0]);
         let mut axis = Axis::new(PRIORS[0]);
+        let command =
+            |k: i32| 0.1 * (f64::from(k) * 0.05).sin() + 0.1 * (f64::from(k) * 0.013).cos();
         let mut rate: f64 = 0.0;
-        for k in 0..1500 {
-            let command = 0.1 * (f64::from(k) * 0.05).sin() + 0.1 * (f64::from(k) * 0.013).cos();
-            let mut terms = [0.0; TERMS];
-            (terms[0], terms[1]) = (command, -rate * time);
-            axis.see(rate, &terms, time, step);
+        for k in 0..3000 {
+            let controls = DELAYS.map(|delay| [command(k - delay as i32), 0.0]);
+            axis.see(rate, &[-rate * time, 0.0, 0.0, 0.0, 0.0], &controls, [time, step]);
             // ten steps of integration between two samples stand for continuous time
-            for _ in 0..10 {
-                let acceleration =
-                    (truth[0] * command + 3.0) / (time * time) - truth[1] / time * rate;
+            for part in 0..10 {
+                let at = f64::from(part) / 10.0;
+                let now = (1.0 - at) * command(k - 4) + at * command(k - 3);
+                let acceleration = (truth[0] * now + 3.0) / (time * time) - truth[1] / time * rate;
                 rate += 0.1 * step * acceleration;
             }
         }
-        for (k, truth) in truth.iter().enumerate() {
-            assert!((axis.known(k) / truth - 1.0).abs() < 0.1, "{:?}", axis.theta);
+        let best = axis.best();
+        for (found, truth) in [best.known(0), best.known(CONTROLS)].into_iter().zip(truth) {
+            assert!((found / truth - 1.0).abs() < 0.1, "{found} for {truth}");
         }
+        let undelayed = &axis.regressions[0];
+        assert!((undelayed.theta[CONTROLS] / truth[1] - 1.0).abs() > 0.1, "{:?}", undelayed.theta);
     }
 
     #[test]
     fn what_was_not_moved_is_not_known() {
         let mut axis = Axis::new(PRIORS[1]);
-        (0..1000).for_each(|_| axis.see(0.0, &[0.0; TERMS], 2.0, 0.01));
-        assert!(axis.known(0).is_nan() && axis.known(2).is_nan());
-        axis.see(f64::NAN, &[0.0; TERMS], 2.0, 0.01);
-        assert!(axis.filters.is_none() && axis.theta == PRIORS[1][0]);
+        let still = [[0.0; CONTROLS]; DELAYS.len()];
+        (0..1000).for_each(|_| axis.see(0.0, &[0.0; MOTION], &still, [2.0, 0.01]));
+        assert!(axis.best().known(0).is_nan() && axis.best().known(CONTROLS).is_nan());
+        axis.see(f64::NAN, &[0.0; MOTION], &still, [2.0, 0.01]);
+        assert!(axis.filters.is_none() && axis.best().theta == PRIORS[1][0]);
     }
 }

@@ -128,15 +128,15 @@ pub struct Status {
     /// outside its band.
     pub residuals: [f64; 6],
     /// Dimensional derivatives of the aircraft at its cruise airspeed, estimated in flight, in the order of
-    /// [`ESTIMATES`]: rad/s² at full deflection for L_δa and M_δe, 1/s for L_p and M_q, 1/s² for M_α.
-    pub derivatives: [f64; 5],
+    /// [`ESTIMATES`]: rad/s² at full deflection for L_δa and M_δe, 1/s for L_p, 1/s² for M_α.
+    pub derivatives: [f64; ESTIMATES.len()],
 }
 
 /// Names of the residuals: specific forces along body x, y, z, then angular accelerations about x, y, z.
 pub const RESIDUALS: [&str; 6] = ["res_fx", "res_fy", "res_fz", "res_roll", "res_pitch", "res_yaw"];
 
-/// Names of the estimated derivatives L_δa, L_p, M_δe, M_q and M_α.
-pub const ESTIMATES: [&str; 5] = ["est_L_da", "est_L_p", "est_M_de", "est_M_q", "est_M_a"];
+/// Names of the estimated derivatives L_δa, L_p, M_δe and M_α.
+pub const ESTIMATES: [&str; 4] = ["est_L_da", "est_L_p", "est_M_de", "est_M_a"];
 
 /// An autopilot as its clients see it. `flight::pilot::Pilot` and a test double in the protocol tests implement it.
 pub trait Autopilot {

@@ -11,23 +11,19 @@ use crate::num::statistics::quantile;
 use crate::physics::atmosphere::STANDARD_GRAVITY;
 
 /// The trait that holds the magnitude of each derivative, and the power of V/g that makes it dimensionless.
-const MAGNITUDES: [(&str, i32); DERIVATIVES.len()] = [
-    ("roll power", 2),
-    ("roll damping", 1),
-    ("pitch power", 2),
-    ("pitch damping", 1),
-    ("pitch stiffness", 2),
-];
+const MAGNITUDES: [(&str, i32); DERIVATIVES.len()] =
+    [("roll power", 2), ("roll damping", 1), ("pitch power", 2), ("pitch stiffness", 2)];
 
 /// The aircraft's own derivatives, in the order and the units of `AircraftEstimator::derivatives`. `None` for an aircraft that
 /// cannot be trimmed at its cruise airspeed.
 fn own(model: &GreyBox) -> Option<[f64; DERIVATIVES.len()]> {
     let values = Character::of(model).ok()?.values;
     let time = model.airframe.envelope.airspeed_cruise_mps / STANDARD_GRAVITY;
-    let mut own = MAGNITUDES.map(|(name, power)| {
-        let place = TRAITS.iter().position(|t| t.name == name).unwrap_or(0);
-        -values[place] / time.powi(power)
-    });
+    let mut own = [0.0; DERIVATIVES.len()];
+    for (own, (name, power)) in own.iter_mut().zip(MAGNITUDES) {
+        let place = TRAITS.iter().position(|t| t.name == name)?;
+        *own = -values[place] / time.powi(power);
+    }
     own[0] = -own[0];
     Some(own)
 }

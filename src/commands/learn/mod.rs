@@ -58,9 +58,10 @@ pub struct Arguments {
     /// Folder of all outputs; a learning found there is resumed.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// What flies the first flights: random actions alone, or the policy for any aircraft with half of the actions random.
-    #[arg(long, value_enum, default_value = "random", requires = "collect")]
-    explorer: FirstFlights,
+    /// Controller of the first flights, half of the actions random, as in `greylag collect`. Without it all actions of the
+    /// first flights are random.
+    #[arg(long, value_enum, value_name = "NAME", requires = "collect")]
+    explorer: Option<Explorer>,
     /// Rounds of flights planned through the model learned so far [default: the budget's].
     #[arg(long, conflicts_with = "logs", value_parser = clap::value_parser!(u32).range(0..=20))]
     rounds: Option<u32>,
@@ -88,25 +89,6 @@ pub struct Arguments {
     /// Hide an effect in that aircraft (may be repeated), as in `greylag collect`.
     #[arg(long, value_name = "ID=AMPLITUDE", allow_hyphen_values = true, requires = "collect")]
     hide: Vec<String>,
-}
-
-/// Actions of the first flights, before there is a model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum FirstFlights {
-    /// Random actions.
-    Random,
-    /// The policy for any aircraft, with half of the actions random.
-    Any,
-}
-
-impl FirstFlights {
-    /// The controller that flies, if any.
-    fn flying(self) -> Option<Explorer> {
-        match self {
-            FirstFlights::Random => None,
-            FirstFlights::Any => Some(Explorer::Any),
-        }
-    }
 }
 
 /// Runs the stages of the learning. Stages that are done are skipped.
@@ -146,10 +128,9 @@ impl Arguments {
         let trainable = self.trained(prior)?;
         let source = match &self.earlier {
             Some(folder) => Source::Recent(self.recent(folder)?),
-            None if self.collect => Source::Simulator {
-                options: self.aircraft_options(prior),
-                explorer: self.explorer.flying(),
-            },
+            None if self.collect => {
+                Source::Simulator { options: self.aircraft_options(prior), explorer: self.explorer }
+            }
             None => Source::Logs(self.logs.clone()),
         };
         let file = self.prior_file()?;

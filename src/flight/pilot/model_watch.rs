@@ -59,3 +59,14 @@ impl Pilot {
         known.unwrap_or([f64::NAN; DERIVATIVES.len()])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::DERIVATIVES;
+    use greylag_link::autopilot::ESTIMATES;
+
+    #[test]
+    fn each_estimate_is_sent_under_its_name() {
+        assert_eq!(ESTIMATES.map(str::to_owned), DERIVATIVES.map(|name| format!("est_{name}")));
+    }
+}

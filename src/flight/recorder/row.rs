@@ -21,12 +21,12 @@ pub struct Row {
     /// unknown.
     pub residuals: [f64; 6],
     /// Derivatives of the aircraft estimated in flight, as in `Status::derivatives`; NaN if unknown.
-    pub derivatives: [f64; 5],
+    pub derivatives: [f64; ESTIMATES.len()],
 }
 
 impl Row {
     /// Names of the columns in addition to those of the log format.
-    pub const EXTRA: [&'static str; 17] = [
+    pub const EXTRA: [&'static str; 16] = [
         "airspeed_target_mps",
         "mode",
         "armed",
@@ -43,7 +43,6 @@ impl Row {
         ESTIMATES[1],
         ESTIMATES[2],
         ESTIMATES[3],
-        ESTIMATES[4],
     ];
 
     /// The row of a tick: a state with its decision and latency (µs).
@@ -53,7 +52,7 @@ impl Row {
             decision: *decision,
             latency_us,
             residuals: [f64::NAN; 6],
-            derivatives: [f64::NAN; 5],
+            derivatives: [f64::NAN; ESTIMATES.len()],
         }
     }
 

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 use super::timing::Timing;
 use crate::recorder::Written;
+use greylag_link::autopilot::ESTIMATES;
 use greylag_link::client::ClientCounts;
 use greylag_link::signing::SigningCounts;
 use greylag_link::vehicle::VehicleCounts;
@@ -25,7 +26,7 @@ pub struct Summary {
     /// Timing of the control loop.
     pub timing: Timing,
     /// Derivatives of the aircraft estimated in flight, as in `Status::derivatives`; NaN if unknown.
-    pub derivatives: [f64; 5],
+    pub derivatives: [f64; ESTIMATES.len()],
     /// Path of the recording and its counters; `None` without a recording.
     pub recording: Option<(PathBuf, Written)>,
 }
@@ -43,11 +44,10 @@ impl Summary {
 }
 
 /// Quantities and units of the derivatives.
-const QUANTITIES: [(&str, &str); 5] = [
+const QUANTITIES: [(&str, &str); ESTIMATES.len()] = [
     ("roll acceleration at full aileron", "rad/s2"),
     ("L_p", "1/s"),
     ("pitch acceleration at full elevator", "rad/s2"),
-    ("M_q", "1/s"),
     ("M_alpha", "1/s2"),
 ];
 
@@ -152,7 +152,7 @@ mod tests {
                 clients: ClientCounts::default(),
                 signing: Some(SigningCounts { unsignable, ..SigningCounts::default() }),
                 timing: Timing::default(),
-                derivatives: [f64::NAN; 5],
+                derivatives: [f64::NAN; ESTIMATES.len()],
                 recording: None,
             };
             summary.to_string()

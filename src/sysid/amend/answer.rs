@@ -262,16 +262,9 @@ mod tests {
             density: 1.225,
         };
         Reconstruction {
-            name: name.into(),
-            step_s: 0.01,
             sampling: Sampling::Instants,
             segments: vec![Segment { instants: (0..30).map(instant).collect() }],
-            nuisances: Vec::new(),
-            noise: [0.0; 8],
-            left: [0.0; 8],
-            force_noise: [0.0; 3],
-            rudder: None,
-            notes: Vec::new(),
+            ..Reconstruction::empty(name)
         }
     }
 

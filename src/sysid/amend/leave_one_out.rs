@@ -260,7 +260,6 @@ fn choose(all: &mut [Scored]) {
 mod tests {
     use super::*;
     use crate::flight_path::reconstruction::{Instant, Segment};
-    use greylag_logs::Sampling;
     use greylag_physics::{Controls, State};
 
     /// A flight of 3 s without motion.
@@ -276,16 +275,11 @@ mod tests {
             density: 1.225,
         };
         Reconstruction {
-            name: name.into(),
-            step_s: 0.01,
-            sampling: Sampling::Held,
             segments: vec![Segment { instants: (0..301).map(instant).collect() }],
-            nuisances: Vec::new(),
             noise: [1e-3; 8],
             left: [1e-3; 8],
             force_noise: [0.1; 3],
-            rudder: None,
-            notes: Vec::new(),
+            ..Reconstruction::empty(name)
         }
     }
 

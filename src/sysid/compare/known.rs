@@ -53,17 +53,7 @@ mod tests {
 
     #[test]
     fn the_sentence_is_on_the_longest_horizon_in_any_order_of_horizons() {
-        let at = |horizon_s, rmse_scaled| {
-            let states = Vec::new();
-            HorizonScore {
-                horizon_s,
-                runs: 3,
-                diverged: 0,
-                divergence_rate: 0.0,
-                rmse_scaled,
-                states,
-            }
-        };
+        let at = HorizonScore::of_three;
         let without = vec![at(10.0, 0.5), at(1.0, 0.4)];
         let used = KnownUse { flights: vec!["a".into()], by_installation: Vec::new(), without };
         let said = used.sentence(&[at(10.0, 0.2), at(1.0, 0.1)]).unwrap();

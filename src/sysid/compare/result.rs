@@ -124,6 +124,15 @@ pub struct HorizonScore {
     pub states: Vec<StateScore>,
 }
 
+#[cfg(test)]
+impl HorizonScore {
+    /// A score of three runs without a divergence, for tests.
+    pub(crate) fn of_three(horizon_s: f64, rmse_scaled: f64) -> HorizonScore {
+        let (runs, diverged, divergence_rate, states) = (3, 0, 0.0, Vec::new());
+        HorizonScore { horizon_s, runs, diverged, divergence_rate, rmse_scaled, states }
+    }
+}
+
 /// Free-run error of one state at one horizon.
 #[derive(Clone, Debug, Serialize)]
 pub struct StateScore {

@@ -107,17 +107,7 @@ mod tests {
 
     #[test]
     fn the_longest_horizon_decides_in_any_order_of_horizons() {
-        let at = |horizon_s, rmse_scaled| {
-            let states = Vec::new();
-            HorizonScore {
-                horizon_s,
-                runs: 3,
-                diverged: 0,
-                divergence_rate: 0.0,
-                rmse_scaled,
-                states,
-            }
-        };
+        let at = HorizonScore::of_three;
         let forecast =
             ForecastResult { name: "hold the state", free_run: vec![at(10.0, 0.1), at(1.0, 0.02)] };
         let said = beaten(&[at(10.0, 0.2), at(1.0, 0.01)], &[forecast]).unwrap();

@@ -89,6 +89,25 @@ pub struct Reconstruction {
     pub notes: Vec<String>,
 }
 
+#[cfg(test)]
+impl Reconstruction {
+    /// A reconstruction at 100 Hz without segments, for tests.
+    pub(crate) fn empty(name: &str) -> Reconstruction {
+        Reconstruction {
+            name: name.into(),
+            step_s: 0.01,
+            sampling: Sampling::Held,
+            segments: Vec::new(),
+            nuisances: Vec::new(),
+            noise: [0.0; 8],
+            left: [0.0; 8],
+            force_noise: [0.0; 3],
+            rudder: None,
+            notes: Vec::new(),
+        }
+    }
+}
+
 impl Reconstruction {
     /// Standard deviation of the constant `name`, in its unit; `None` if the constant was not estimated.
     ///

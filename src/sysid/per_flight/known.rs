@@ -128,23 +128,10 @@ pub fn not_used(known: &Known, flights: &[&Reconstruction]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use greylag_logs::Sampling;
 
     #[test]
     fn constants_that_a_search_does_not_use_are_noted() {
-        let flight = |name: &str| Reconstruction {
-            name: name.into(),
-            step_s: 0.01,
-            sampling: Sampling::Held,
-            segments: Vec::new(),
-            nuisances: Vec::new(),
-            noise: [0.0; 8],
-            left: [0.0; 8],
-            force_noise: [0.0; 3],
-            rudder: None,
-            notes: Vec::new(),
-        };
-        let (a, b) = (flight("a.csv"), flight("b.csv"));
+        let [a, b] = ["a.csv", "b.csv"].map(Reconstruction::empty);
         let constants = FlightConstants {
             source: String::new(),
             axes_deg: None,

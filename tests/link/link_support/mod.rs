@@ -50,7 +50,7 @@ impl Double {
                 actuators: ActuatorState::default(),
                 load: 0.2,
                 residuals: [f64::NAN; 6],
-                derivatives: [f64::NAN; 5],
+                derivatives: [f64::NAN; 4],
             },
             parameters: vec![
                 parameter("GL_BANK_MAX", ParameterValue::Real(60.0)),

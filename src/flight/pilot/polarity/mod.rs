@@ -267,7 +267,7 @@ mod tests {
         for late in [0, 3, 6] {
             let roll = verdict(late, |[aileron, elevator]| [-aileron, elevator]).0;
             assert_eq!(roll, Verdict::Wrong(Fault::Reversed(Axis::Roll)), "{late}");
-            // A reversed trim pitches the nose up before the first pulse, whatever the lead of the handover.
+            // With the elevator reversed, the trim pitches the nose up before the first pulse, however early authority is given.
             for early in 0..=4 {
                 let (pitch, _) =
                     verdict_after(early, late, |[aileron, elevator]| [aileron, -elevator]);

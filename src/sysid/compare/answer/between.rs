@@ -43,17 +43,7 @@ mod tests {
 
     #[test]
     fn horizons_beyond_that_of_the_answer_have_a_best_forecast_too() {
-        let at = |horizon_s, rmse_scaled| {
-            let states = Vec::new();
-            HorizonScore {
-                horizon_s,
-                runs: 3,
-                diverged: 0,
-                divergence_rate: 0.0,
-                rmse_scaled,
-                states,
-            }
-        };
+        let at = HorizonScore::of_three;
         let model = ModelResult {
             name: "m".into(),
             sentences: Vec::new(),

@@ -63,23 +63,10 @@ fn numbers(used: &[&Reconstruction], all: &[Reconstruction]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use greylag_logs::Sampling;
 
     #[test]
     fn a_flight_keeps_its_number_if_an_earlier_one_is_left_out() {
-        let flight = || Reconstruction {
-            name: "f".into(),
-            step_s: 0.01,
-            sampling: Sampling::Held,
-            segments: Vec::new(),
-            nuisances: Vec::new(),
-            noise: [0.0; 8],
-            left: [0.0; 8],
-            force_noise: [0.0; 3],
-            rudder: None,
-            notes: Vec::new(),
-        };
-        let all = [flight(), flight(), flight()];
+        let all = ["f"; 3].map(Reconstruction::empty);
         assert_eq!(numbers(&[&all[0], &all[2]], &all), [0, 2]);
     }
 }
