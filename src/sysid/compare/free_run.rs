@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use rayon::prelude::*;
 
+use super::observer::{Disturbance, Observer};
 use super::result::{GrowthPoint, HorizonScore, StateScore};
 use crate::flight_path::reconstruction::Instant;
 use crate::per_flight::known::KnownFlight;
@@ -39,6 +40,16 @@ pub type Trace = [Vec<f64>; 8];
 /// Free runs of `model` over all `flights`, sampled at the `horizons` (s) and at the points of the growth curve up to the
 /// longest horizon. Constants of a flight in the model's file (trims, sensor errors) are applied to that flight.
 pub fn fly(model: &GreyBox, flights: &[Prepared], horizons: &[f64]) -> (Runs, Vec<Trace>) {
+    fly_with(model, flights, horizons, None)
+}
+
+/// As [`fly`], with the disturbance that `observer` finds before each run.
+pub fn fly_with(
+    model: &GreyBox,
+    flights: &[Prepared],
+    horizons: &[f64],
+    observer: Option<Observer>,
+) -> (Runs, Vec<Trace>) {
     let longest = horizons.iter().copied().fold(0.0, f64::max);
     let growth = (1..=GROWTH_POINTS).map(|k| longest * k as f64 / GROWTH_POINTS as f64);
     let mut times: Vec<f64> = horizons.iter().copied().chain(growth).collect();
@@ -49,7 +60,7 @@ pub fn fly(model: &GreyBox, flights: &[Prepared], horizons: &[f64]) -> (Runs, Ve
     for flight in flights {
         let known = KnownFlight::of(model, flight);
         let (with, right) = known.as_ref().map_or((model, flight), |k| (&k.model, &k.flight));
-        let (flown, mut trace) = fly_one(with, &right.acting(with), &times);
+        let (flown, mut trace) = fly_one(with, &right.acting(with), &times, observer);
         if let Some(known) = &known {
             measured_from(&mut trace, known);
         }
@@ -88,7 +99,12 @@ fn measured_from(trace: &mut Trace, known: &KnownFlight) {
     }
 }
 
-fn fly_one(model: &GreyBox, flight: &Prepared, times: &[f64]) -> (Vec<Vec<Look>>, Trace) {
+fn fly_one(
+    model: &GreyBox,
+    flight: &Prepared,
+    times: &[f64],
+    observer: Option<Observer>,
+) -> (Vec<Vec<Look>>, Trace) {
     let every = ((START_EVERY_S / flight.dt).round() as usize).max(1);
     let looks: Vec<usize> =
         times.iter().map(|t| ((t / flight.dt).round() as usize).max(1)).collect();
@@ -102,7 +118,10 @@ fn fly_one(model: &GreyBox, flight: &Prepared, times: &[f64]) -> (Vec<Vec<Look>>
         for starts in starts.chunks(RUNS_AT_A_TIME) {
             let flown: Vec<(Vec<Look>, Vec<[f64; 8]>)> = starts
                 .par_iter()
-                .map(|&start| run(&model, flight, segment, start, &looks, every))
+                .map(|&start| {
+                    let disturbed = observer.map(|o| o.before(&model, flight, segment, start));
+                    run(&model, flight, segment, start, [&looks[..], &[every]], disturbed)
+                })
                 .collect();
             for (start, (looks, path)) in starts.iter().zip(flown) {
                 for (k, list) in trace.iter_mut().enumerate() {
@@ -147,7 +166,7 @@ pub fn from_moment(model: &GreyBox, flight: &Prepared, time_s: f64, seconds: f64
     let segment = flight.segments.iter().find(inside)?;
     let start = segment.partition_point(|i| i.time_s < time_s - 0.5 * flight.dt);
     let keep = ((seconds / flight.dt).round() as usize).max(1) + 1;
-    let (_, rows) = run(&flight.stepping(model), flight, segment, start, &[], keep);
+    let (_, rows) = run(&flight.stepping(model), flight, segment, start, [&[], &[keep]], None);
     let mut path = Path::default();
     for (instant, row) in segment[start..].iter().zip(rows) {
         path.time_s.push(instant.time_s);
@@ -166,9 +185,10 @@ fn run(
     flight: &Prepared,
     segment: &[Instant],
     start: usize,
-    looks: &[usize],
-    keep: usize,
+    [looks, keep]: [&[usize]; 2],
+    mut disturbance: Option<Disturbance>,
 ) -> (Vec<Look>, Vec<[f64; 8]>) {
+    let keep = keep[0];
     let scale = model.scale();
     let mut memory = Memory::default();
     let advance = |k: usize, state: State, memory: &mut Memory| {
@@ -185,6 +205,11 @@ fn run(
     let mut path = vec![state.to_array()];
     for i in start..last.max((start + keep).min(segment.len()) - 1) {
         state = advance(i, state, &mut memory);
+        if let Some(disturbance) = &mut disturbance {
+            let mut now = state.to_array();
+            disturbance.act(&mut now, flight.dt);
+            state = State::from_array(now);
+        }
         let measured = segment[i + 1].state.to_array();
         let error = error(&measured, &state.to_array());
         let good = scaled(&error, &scale) <= DIVERGENCE_BOUND;

@@ -13,6 +13,7 @@ mod flight;
 pub mod forecast;
 pub mod free_run;
 mod known;
+pub mod observer;
 mod power;
 mod result;
 mod run;
@@ -27,6 +28,6 @@ pub use result::{
     GrowthPoint, HorizonScore, KnownUse, Map, MapCell, ModelResult, ModelTrace, NuisanceResult,
     Regime, RegimeBins, Settings, StateScore,
 };
-pub use run::{Options, abstentions, compare, scores};
+pub use run::{Options, abstentions, compare, scores, scores_with};
 #[cfg(feature = "study")]
 pub(crate) use verdict::unpredicted;
