@@ -1,18 +1,12 @@
 //! Baseline forecasts without aerodynamics: held state, straight flight, linear model (ARX).
 
-use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
+use super::arx::{self, Arx};
 use super::free_run::{DIVERGENCE_BOUND, Look, Runs, START_EVERY_S, error, scaled};
 use super::result::HorizonScore;
 use crate::flight_path::reconstruction::Instant;
 use crate::weak_form::prepared::Prepared;
-
-/// Number of regressors of the linear model: eight states, aileron, elevator, throttle, rudder and a constant.
-const REGRESSORS: usize = 13;
-/// Singular values below this share of the largest are treated as zero, for example those of a rudder that never
-/// moves.
-const RANK: f64 = 1e-9;
 
 /// Free-run error of a baseline forecast, with the same starts as the free runs of the models.
 #[derive(Clone, Debug, Serialize)]
@@ -24,14 +18,14 @@ pub struct ForecastResult {
 }
 
 /// A rule for the next state.
-enum Forecast {
+pub(super) enum Forecast {
     /// The initial state is held.
     Hold,
     /// Attitude, airspeed and flow angles are held at their initial values. The body rates are zero.
     Straight,
-    /// A first-order linear model with the controls as inputs (ARX), fitted by least squares. The function `forecasts` fits
-    /// this model to the same flights on which it computes the error. This error is therefore optimistic.
-    Linear(DMatrix<f64>),
+    /// A linear model with the controls as inputs (ARX), fitted by least squares. The function `forecasts` fits one of first
+    /// order to the same flights on which it computes the error. This error is therefore optimistic.
+    Linear(Arx),
 }
 
 impl Forecast {
@@ -43,23 +37,29 @@ impl Forecast {
         }
     }
 
-    /// The state `dt` (s) after `state`, with the controls of `at`.
-    fn next(&self, state: &[f64; 8], at: &Instant, dt: f64) -> [f64; 8] {
+    /// Number of samples from which the next state is computed.
+    fn order(&self) -> usize {
         match self {
-            Forecast::Hold => *state,
+            Forecast::Hold | Forecast::Straight => 1,
+            Forecast::Linear(arx) => arx.order(),
+        }
+    }
+
+    /// The state `dt` (s) after `past[0]`. `past` has the present state and those before it, the newest first; `flown` has the
+    /// samples of the segment up to the present one.
+    fn next(&self, past: &[[f64; 8]], flown: &[Instant], dt: f64) -> [f64; 8] {
+        match self {
+            Forecast::Hold => past[0],
             Forecast::Straight => {
-                let [roll, pitch, airspeed, _, _, _, alpha, beta] = *state;
+                let [roll, pitch, airspeed, _, _, _, alpha, beta] = past[0];
                 [roll, pitch, airspeed, 0.0, 0.0, 0.0, alpha, beta]
             }
-            Forecast::Linear(slopes) => {
-                let rate = slopes * DVector::from_column_slice(&regressors(state, at));
-                std::array::from_fn(|k| state[k] + dt * rate[k])
-            }
+            Forecast::Linear(arx) => arx.next(past, flown, dt),
         }
     }
 
     /// One run from sample `start` of `segment`. The run is sampled after each number of steps in `looks`.
-    fn run(
+    pub(super) fn run(
         &self,
         segment: &[Instant],
         dt: f64,
@@ -67,68 +67,42 @@ impl Forecast {
         looks: &[usize],
         scale: &[f64; 8],
     ) -> Vec<Look> {
-        let mut state = segment[start].state.to_array();
+        let mut past = arx::past(segment, start, self.order());
         let (mut seen, mut lost) = (Vec::new(), false);
         let reached = looks.iter().filter(|l| start + **l < segment.len());
         let mut at = start;
         for look in reached {
             while at < start + look && !lost {
-                state = self.next(&state, &segment[at], dt);
+                let next = self.next(&past, &segment[..=at], dt);
+                past.rotate_right(1);
+                past[0] = next;
                 at += 1;
-                let miss = scaled(&error(&segment[at].state.to_array(), &state), scale);
+                let miss = scaled(&error(&segment[at].state.to_array(), &next), scale);
                 lost = miss.is_nan() || miss > DIVERGENCE_BOUND;
             }
-            seen.push((!lost).then(|| [segment[at].state.to_array(), state]));
+            seen.push((!lost).then(|| [segment[at].state.to_array(), past[0]]));
         }
         seen
     }
 }
 
-fn regressors(state: &[f64; 8], at: &Instant) -> [f64; REGRESSORS] {
-    let c = at.controls;
-    let [roll, pitch, airspeed, p, q, r, alpha, beta] = *state;
-    let rudder = if c.rudder.is_finite() { c.rudder } else { 0.0 };
-    [roll, pitch, airspeed, p, q, r, alpha, beta, c.aileron, c.elevator, c.throttle, rudder, 1.0]
-}
-
-/// Coefficients of the rates of the eight states with respect to the regressors, by least squares over all `flights`. `None`
-/// if a coefficient is not finite.
-fn linear(flights: &[Prepared]) -> Option<DMatrix<f64>> {
-    let mut gram = DMatrix::<f64>::zeros(REGRESSORS, REGRESSORS);
-    let mut moments = DMatrix::<f64>::zeros(REGRESSORS, 8);
-    for flight in flights {
-        for pair in flight.segments.iter().flat_map(|s| s.windows(2)) {
-            let state = pair[0].state.to_array();
-            let row = DVector::from_column_slice(&regressors(&state, &pair[0]));
-            let step = error(&state, &pair[1].state.to_array()).map(|x| x / flight.dt);
-            gram.ger(1.0, &row, &row, 1.0);
-            moments.ger(1.0, &row, &DVector::from_column_slice(&step), 1.0);
-        }
-    }
-    let size = gram.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
-    let size = DMatrix::from_diagonal(&size);
-    let solved = (&size * gram * &size).svd(true, true).solve(&(&size * moments), RANK).ok()?;
-    let slopes = (size * solved).transpose();
-    slopes.iter().all(|x| x.is_finite()).then_some(slopes)
-}
-
 /// Free-run errors of all forecasts on `flights` at the `horizons` (s). The errors of the states are divided by `scale`. The
 /// linear model is fitted to the same flights.
 pub fn forecasts(flights: &[Prepared], scale: [f64; 8], horizons: &[f64]) -> Vec<ForecastResult> {
-    let linear = linear(flights).map(Forecast::Linear);
+    let linear = Arx::first_order(flights).map(Forecast::Linear);
     let all = [Forecast::Hold, Forecast::Straight].into_iter().chain(linear);
     results(all, flights, scale, horizons)
 }
 
 /// Free-run errors of all forecasts on `flights` at the `horizons` (s). The errors of the states are divided by `scale`. The
-/// linear model is fitted to the flights `seen`.
+/// linear model, of first order, is fitted to the flights `seen`; one of another order is an [`Arx`].
 pub fn on_unseen(
     seen: &[Prepared],
     flights: &[Prepared],
     scale: [f64; 8],
     horizons: &[f64],
 ) -> Vec<ForecastResult> {
-    let linear = linear(seen).map(Forecast::Linear);
+    let linear = Arx::first_order(seen).map(Forecast::Linear);
     let all = [Forecast::Hold, Forecast::Straight].into_iter().chain(linear);
     results(all, flights, scale, horizons)
 }
@@ -140,12 +114,23 @@ fn results(
     horizons: &[f64],
 ) -> Vec<ForecastResult> {
     all.map(|forecast| {
-        let runs = flights.iter().flat_map(|f| flown(&forecast, f, scale, horizons)).collect();
-        let runs = Runs::new(horizons.to_vec(), runs, scale);
-        let free_run = horizons.iter().map(|h| runs.score(*h)).collect();
+        let free_run = scores(&forecast, flights, scale, horizons);
         ForecastResult { name: forecast.name(), free_run }
     })
     .collect()
+}
+
+/// Free-run errors of `forecast` on `flights`, one for each of the `horizons` (s). The errors of the states are divided by
+/// `scale`.
+pub(super) fn scores(
+    forecast: &Forecast,
+    flights: &[Prepared],
+    scale: [f64; 8],
+    horizons: &[f64],
+) -> Vec<HorizonScore> {
+    let runs = flights.iter().flat_map(|f| flown(forecast, f, scale, horizons)).collect();
+    let runs = Runs::new(horizons.to_vec(), runs, scale);
+    horizons.iter().map(|h| runs.score(*h)).collect()
 }
 
 /// The runs of one flight, with the same starts as the free runs of the models.

@@ -3,6 +3,7 @@
 //! The method is described in `docs/explanation/comparison.md`. Models are compared as given, without tuning.
 
 pub mod answer;
+pub mod arx;
 mod bins;
 pub mod bootstrap;
 mod discovery;

@@ -1,0 +1,219 @@
+//! Free-run error 1, 2 and 5 s ahead on flights held out, of every real aircraft in `tests/data`, beside what a model must beat:
+//! `cargo run --release --ignore-rust-version --features sitl --example real_aircraft > results/real-aircraft.txt`.
+//!
+//! A flight (of the A430), or a half of a flight (of the others), is held out in turn. All choices are made without it: the
+//! structure of the fit and the order of ARX by leaving out one of the flights fitted, or one of three parts of each where there
+//! are fewer than three.
+//!
+//! With `-- --learning-curve > results/real-learning-curve.txt` the same is done with less and less training data
+//! (`learning_curve.rs`). With `-- --cuts` the same training data are fitted whole and cut (`cuts.rs`).
+
+mod aircraft;
+mod cuts;
+mod learning_curve;
+mod least_squares;
+
+use anyhow::{Result, bail};
+use greylag::model::GreyBox;
+use greylag::sysid::amend::leave_one_out::{Fitted, Structure, leave_one_out};
+use greylag::sysid::amend::{Options, amend};
+use greylag::sysid::compare::arx::{self, Arx, Choice};
+use greylag::sysid::compare::{HorizonScore, forecast, scores};
+use greylag::sysid::flight_path::reconstruction::Reconstruction;
+use greylag::sysid::per_flight::PerFlight;
+use greylag::sysid::progress::ignore_progress;
+use greylag::sysid::weak_form::prepared::Prepared;
+
+use aircraft::{numbered, pieces};
+use least_squares::least_squares;
+
+/// Horizons of the free runs, s.
+const HORIZONS_S: [f64; 3] = [1.0, 2.0, 5.0];
+/// What is judged, in the order of the table.
+const WAYS: [&str; 7] = [
+    "from geometry",
+    "fitted",
+    "least squares",
+    "hold the state",
+    "straight on",
+    "ARX of order 1",
+    "ARX, order chosen",
+];
+/// Place of the fitted model in [`WAYS`].
+const FITTED: usize = 1;
+/// Place of the first forecast without aerodynamics in [`WAYS`].
+const HOLD: usize = 3;
+/// Place of the ARX forecast in [`WAYS`] whose order is chosen.
+const CHOSEN_ARX: usize = 6;
+/// Place of the structure among those of [`structures`] that is fitted where the data are too short for a choice.
+const TUNED: usize = 1;
+
+/// Scaled free-run errors (dimensionless) of one way at every horizon; NaN where no run gets there.
+type Row = [f64; HORIZONS_S.len()];
+/// Scaled free-run errors (dimensionless) of every way.
+type Errors = [Row; WAYS.len()];
+
+/// What all ways reach on a flight held out.
+struct Judged {
+    /// The errors of all ways.
+    errors: Errors,
+    /// Structure of the fitted model, in words.
+    structure: String,
+    /// Order and ridge of the ARX forecast whose order is chosen, in words.
+    arx: String,
+}
+
+fn main() -> Result<()> {
+    let asked: Vec<String> = std::env::args().skip(1).collect();
+    let asked: Vec<&str> = asked.iter().map(String::as_str).collect();
+    match asked[..] {
+        [] => table(),
+        ["--learning-curve"] => learning_curve::print(),
+        ["--cuts"] => cuts::print(),
+        _ => bail!("give nothing, --learning-curve or --cuts, not {}", asked.join(" ")),
+    }
+}
+
+/// Prints the errors of all aircraft with all of their training data.
+fn table() -> Result<()> {
+    println!(
+        "Scaled error of free runs on flights held out: mean over those held out ± its standard error"
+    );
+    for aircraft in aircraft::all()? {
+        println!("\n{}", aircraft.name);
+        let mut all = Vec::new();
+        for left in 0..aircraft.flights.len() {
+            let (fit, test) = aircraft.held_out(left);
+            let judged = judged(&aircraft.model, &fit, &test)?;
+            println!("  held out {}: {}; {}", test.name, judged.structure, judged.arx);
+            all.push(judged.errors);
+        }
+        print_errors(&all);
+    }
+    Ok(())
+}
+
+/// Prints a table of `all`, the errors on each flight held out: mean and standard error of every way.
+fn print_errors(all: &[Errors]) {
+    println!("  {:<18}{:>20}{:>20}{:>20}", "", "1 s", "2 s", "5 s");
+    for (k, way) in WAYS.iter().enumerate() {
+        print_row(way, &all.iter().map(|e| e[k]).collect::<Vec<_>>());
+    }
+}
+
+/// Prints a line of a table: `name`, then mean and standard error at every horizon of `all`, one entry a flight held out.
+fn print_row(name: &str, all: &[Row]) {
+    let at = |h: usize| cell(&all.iter().map(|row| row[h]).collect::<Vec<_>>());
+    println!("  {name:<18}{:>20}{:>20}{:>20}", at(0), at(1), at(2));
+}
+
+/// Mean and standard error of the `errors` that are known, and their number.
+fn cell(errors: &[f64]) -> String {
+    let known: Vec<f64> = errors.iter().copied().filter(|x| x.is_finite()).collect();
+    let n = known.len() as f64;
+    let mean = known.iter().sum::<f64>() / n;
+    let spread = known.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    match known.len() {
+        0 => "-".into(),
+        1 => format!("{mean:.3} (1)"),
+        n => format!("{mean:.3} ± {:.3} ({n})", (spread / n as f64).sqrt()),
+    }
+}
+
+/// Errors on the flight `test` of all ways, made of the flights `fit` alone, and what was chosen.
+fn judged(model: &GreyBox, fit: &[Reconstruction], test: &Reconstruction) -> Result<Judged> {
+    let test = std::slice::from_ref(test);
+    let slowest = model.airframe.envelope.flying_from_mps();
+    let ready = |all: &[Reconstruction]| {
+        all.iter().map(|f| Prepared::new(f, slowest)).collect::<Result<Vec<_>, _>>()
+    };
+    let parts = parts(fit);
+    let (seen, seen_parts, unseen) = (ready(fit)?, ready(&parts[..])?, ready(test)?);
+    let (fitted, structure) = fitted(model, fit, &parts);
+    let mut errors = [[f64::NAN; HORIZONS_S.len()]; WAYS.len()];
+    for (row, model) in errors.iter_mut().zip([model, &fitted, &least_squares(model, &seen)]) {
+        *row = scaled(&scores(model, test, &HORIZONS_S)?);
+    }
+    let forecasts = forecast::on_unseen(&seen, &unseen, model.scale(), &HORIZONS_S);
+    for (row, forecast) in errors[HOLD..].iter_mut().zip(forecasts) {
+        *row = scaled(&forecast.free_run);
+    }
+    let (arx, named) = chosen_arx(&seen, &seen_parts, model.scale());
+    if let Some(arx) = arx {
+        errors[CHOSEN_ARX] = scaled(&arx.scores(&unseen, model.scale(), &HORIZONS_S)?);
+    }
+    Ok(Judged { errors, structure, arx: named })
+}
+
+/// The scaled errors of `scores`, one for each horizon.
+fn scaled(scores: &[HorizonScore]) -> Row {
+    std::array::from_fn(|h| scores[h].rmse_scaled)
+}
+
+/// What is left out in turn to choose a structure or an order: the flights `fit`, or three parts of each where there are fewer
+/// than three.
+fn parts(fit: &[Reconstruction]) -> Vec<Reconstruction> {
+    match fit.len() {
+        0..=2 => fit.iter().flat_map(|f| numbered(pieces(std::slice::from_ref(f), 3))).collect(),
+        _ => fit.to_vec(),
+    }
+}
+
+/// The structures of a fit that are tried, with their names.
+fn structures() -> [Structure; 4] {
+    let of = |per_flight: PerFlight| Fitted::Coefficients { effects: Vec::new(), per_flight };
+    let axes = PerFlight { askew_deg: Some(3.0), ..PerFlight::default() };
+    let trims = PerFlight { trims: Some(1.0), ..PerFlight::default() };
+    let structures = [
+        ("as given", Fitted::Nothing),
+        ("tuned", of(PerFlight::default())),
+        ("tuned, axes of each flight", of(axes)),
+        ("tuned, trims of each flight", of(trims)),
+    ];
+    structures.map(|(name, fitted)| Structure { name: name.into(), fitted })
+}
+
+/// `model` fitted to all of `fit` with the structure that predicts each of `parts` best from the others, and what that is.
+///
+/// Where the parts are too short for a choice, the coefficients alone are fitted; where a fit fails, the model stays as given.
+fn fitted(model: &GreyBox, fit: &[Reconstruction], parts: &[Reconstruction]) -> (GreyBox, String) {
+    let structures = structures();
+    let (chosen, name) =
+        match leave_one_out(model, parts, &structures, &HORIZONS_S, &ignore_progress) {
+            Ok(scored) => {
+                let chosen = scored.iter().position(|s| s.chosen).unwrap_or(0);
+                (chosen, structures[chosen].name.clone())
+            }
+            Err(why) => {
+                eprintln!("  no choice of the structure: {why}");
+                (TUNED, "tuned, without a choice".into())
+            }
+        };
+    let Fitted::Coefficients { per_flight, .. } = &structures[chosen].fitted else {
+        return (model.clone(), name);
+    };
+    let options = Options { per_flight: *per_flight, ..Options::default() };
+    match amend(model, fit, fit, &options, &ignore_progress) {
+        Ok(amended) => (amended.model, name),
+        Err(why) => {
+            eprintln!("  no fit: {why}");
+            (model.clone(), "as given, for no fit was possible".into())
+        }
+    }
+}
+
+/// An ARX forecast fitted to `seen`, with the order and the ridge that predict each of `parts` best from the others, and what
+/// these are. `scale` has the reference values of the states, in their units.
+fn chosen_arx(seen: &[Prepared], parts: &[Prepared], scale: [f64; 8]) -> (Option<Arx>, String) {
+    let choice = arx::choose(parts, scale, &HORIZONS_S).unwrap_or_else(|why| {
+        eprintln!("  no choice of the order: {why}");
+        Choice { order: 1, ridge: 0.0 }
+    });
+    match Arx::fit(seen, choice) {
+        Ok(arx) => (Some(arx), format!("ARX of order {}, ridge {:?}", choice.order, choice.ridge)),
+        Err(why) => {
+            eprintln!("  no ARX: {why}");
+            (None, "no ARX".into())
+        }
+    }
+}

@@ -1,0 +1,326 @@
+//! Forecast by a linear model with the deflections as inputs (ARX) of any order, and the choice of its order.
+//!
+//! With the states x and the deflections u of sample k and of the samples before it, the model is
+//! ẋ(k) = Σ A(i) x(k − i) + B(i) u(k − i) + c over i = 0 to order − 1, and x(k + 1) = x(k) + ẋ(k) Δt (Ljung, System
+//! Identification, 1999, section 4.2). A, B and c follow from least squares of one step. Departs from the reference: the states
+//! are those of the reconstruction, which has removed most of their noise.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::forecast::{self, Forecast};
+use super::free_run::error;
+use super::result::HorizonScore;
+use crate::flight_path::reconstruction::Instant;
+use crate::weak_form::prepared::Prepared;
+use greylag_num::statistics::mean;
+
+/// Number of regressors of one sample: eight states, aileron, elevator, throttle and rudder.
+const OF_SAMPLE: usize = 12;
+/// Singular values of the normalised normal equations that do not exceed this bound are treated as zero, for example those of a
+/// rudder that never moves.
+const RANK: f64 = 1e-9;
+/// Orders that are tried, in samples.
+pub const ORDERS: [usize; 6] = [1, 2, 3, 4, 6, 8];
+/// Ridges that are tried with each order, dimensionless.
+pub const RIDGES: [f64; 4] = [0.0, 1e-6, 1e-4, 1e-2];
+/// Smallest relative decrease of the error for which a higher order replaces a lower one.
+const CLEARLY: f64 = 0.01;
+/// Scaled errors below this value, dimensionless, count as equal: they may differ by rounding only.
+const LEAST_ERROR: f64 = 1e-6;
+
+/// Order and ridge of an ARX model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Choice {
+    /// Number of samples from which a rate is computed: the present one and those before it; at least 1.
+    pub order: usize,
+    /// Number that is added to the diagonal of the normal equations after their scaling to a unit diagonal, dimensionless. It
+    /// shrinks all coefficients towards zero, with which the state is held.
+    pub ridge: f64,
+}
+
+/// Reason why an ARX model cannot be fitted, chosen or judged.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ArxError {
+    /// The order is zero.
+    #[error("cannot fit a linear forecast (ARX) of order 0; ask for an order of at least 1")]
+    NoOrder,
+    /// There are fewer equations than unknowns.
+    #[error(
+        "cannot fit a linear forecast (ARX) of order {order}: {rows} steps between samples for {needed} unknowns of each state; \
+         ask for a lower order, or give longer flights"
+    )]
+    TooLittle {
+        /// Order of the model, in samples.
+        order: usize,
+        /// Number of steps between samples that have all samples before them.
+        rows: usize,
+        /// Number of unknowns of each state, and smallest number of steps.
+        needed: usize,
+    },
+    /// The equations have no finite solution.
+    #[error(
+        "cannot fit a linear forecast (ARX) of order {order}: a coefficient is no number; check the log for values that are not \
+         physical"
+    )]
+    NotFinite {
+        /// Order of the model, in samples.
+        order: usize,
+    },
+    /// The samples of two flights are not equally far apart, so that the samples before one mean different times.
+    #[error(
+        "cannot use one linear forecast (ARX) for flights of {one} and {other} model steps a sample; resample the flights alike"
+    )]
+    Steps {
+        /// Number of model steps between samples of one flight, or of the flights of the fit.
+        one: usize,
+        /// Number of model steps between samples of the other flight.
+        other: usize,
+    },
+    /// A single flight cannot be predicted from the others.
+    #[error(
+        "cannot choose the order of a linear forecast (ARX) with {flights} flight(s): each is predicted from the others, so two \
+         are the least; cut a flight into parts"
+    )]
+    TooFewFlights {
+        /// Number of flights.
+        flights: usize,
+    },
+    /// No flight reaches a horizon, or the others are too short for a fit.
+    #[error(
+        "cannot choose the order of a linear forecast (ARX): none of {flights} flights is longer than {shortest_s} s, or those \
+         beside it are too short for a fit; give longer flights"
+    )]
+    TooShort {
+        /// Number of flights.
+        flights: usize,
+        /// Shortest horizon, s.
+        shortest_s: f64,
+    },
+}
+
+/// An ARX model of the eight states.
+#[derive(Clone, Debug)]
+pub struct Arx {
+    order: usize,
+    /// Number of model steps between the samples with which the model was fitted.
+    substeps: usize,
+    /// Derivatives of the rates of the eight states (rows) with respect to the regressors (columns).
+    slopes: DMatrix<f64>,
+}
+
+impl Arx {
+    /// Fits a model to all samples of `flights` that have enough samples before them in their segment.
+    ///
+    /// # Errors
+    /// The order is 0, the flights differ in the time between samples, there are fewer steps than unknowns, or a coefficient is
+    /// not finite.
+    pub fn fit(flights: &[Prepared], choice: Choice) -> Result<Arx, ArxError> {
+        if choice.order == 0 {
+            return Err(ArxError::NoOrder);
+        }
+        let substeps = flights.first().map_or(1, |f| f.substeps);
+        same_steps(substeps, flights)?;
+        Sums::of(flights.iter(), choice.order).arx(choice, substeps)
+    }
+
+    /// The model of order 1 without a ridge, however few samples `flights` have. `None` if a coefficient is not finite.
+    pub(super) fn first_order(flights: &[Prepared]) -> Option<Arx> {
+        let slopes = Sums::of(flights.iter(), 1).slopes(0.0)?;
+        Some(Arx { order: 1, substeps: flights.first().map_or(1, |f| f.substeps), slopes })
+    }
+
+    /// Number of samples from which a rate is computed.
+    pub fn order(&self) -> usize {
+        self.order
+    }
+
+    /// Free-run errors on `flights`, one for each of `horizons_s` (s), with the same starts as the free runs of the models. The
+    /// errors of the states are divided by `scale`, in the units of the state.
+    ///
+    /// A run that starts at a segment's first samples lacks samples before them. The first sample then stands for these.
+    ///
+    /// # Errors
+    /// The time between samples of a flight is not that of the fit.
+    pub fn scores(
+        &self,
+        flights: &[Prepared],
+        scale: [f64; 8],
+        horizons_s: &[f64],
+    ) -> Result<Vec<HorizonScore>, ArxError> {
+        same_steps(self.substeps, flights)?;
+        Ok(forecast::scores(&Forecast::Linear(self.clone()), flights, scale, horizons_s))
+    }
+
+    /// The state `dt` (s) after `past[0]`. `past` has the present state and those before it, the newest first; `flown` has the
+    /// samples of the segment up to the present one.
+    pub(super) fn next(&self, past: &[[f64; 8]], flown: &[Instant], dt: f64) -> [f64; 8] {
+        let rate = &self.slopes * regressors(past, flown);
+        std::array::from_fn(|k| past[0][k] + dt * rate[k])
+    }
+}
+
+/// Checks that the samples of all `flights` are `substeps` model steps apart.
+fn same_steps(substeps: usize, flights: &[Prepared]) -> Result<(), ArxError> {
+    match flights.iter().find(|f| f.substeps != substeps) {
+        Some(flight) => Err(ArxError::Steps { one: substeps, other: flight.substeps }),
+        None => Ok(()),
+    }
+}
+
+/// Chooses order and ridge by leaving out each of `flights` in turn: a fit to the others predicts it.
+///
+/// The error of a choice is the geometric mean over `horizons_s` (s) of the free-run error, averaged over the flights left out
+/// that reach the horizon. The errors of the states are divided by `scale`, in the units of the state. Of the ridges in
+/// [`RIDGES`] each order takes the best. Of the orders in [`ORDERS`] a higher one is taken only if it lowers the error by more
+/// than 1 %.
+///
+/// # Errors
+/// There are fewer than two flights, they differ in the time between samples, or they are too short.
+pub fn choose(
+    flights: &[Prepared],
+    scale: [f64; 8],
+    horizons_s: &[f64],
+) -> Result<Choice, ArxError> {
+    if flights.len() < 2 {
+        return Err(ArxError::TooFewFlights { flights: flights.len() });
+    }
+    same_steps(flights[0].substeps, flights)?;
+    let mut best: Option<(Choice, f64)> = None;
+    for order in ORDERS {
+        let without = |left: usize| {
+            let others = flights.iter().enumerate().filter(|(k, _)| *k != left);
+            Sums::of(others.map(|(_, flight)| flight), order)
+        };
+        let others: Vec<Sums> = (0..flights.len()).into_par_iter().map(without).collect();
+        let judged = RIDGES.iter().filter_map(|&ridge| {
+            let choice = Choice { order, ridge };
+            Some((choice, error_left_out(flights, &others, choice, scale, horizons_s)?))
+        });
+        let Some(own) = judged.min_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
+        if best.is_none_or(|(_, least)| own.1 < (1.0 - CLEARLY) * least) {
+            best = Some(own);
+        }
+    }
+    let shortest_s = horizons_s.iter().copied().fold(f64::INFINITY, f64::min);
+    let too_short = ArxError::TooShort { flights: flights.len(), shortest_s };
+    best.map(|(choice, _)| choice).ok_or(too_short)
+}
+
+/// Error of `choice` in the sense of [`choose`]; `others` has the sums of all flights but one, in the order of `flights`. `None`
+/// if a fit fails or no flight reaches a horizon.
+fn error_left_out(
+    flights: &[Prepared],
+    others: &[Sums],
+    choice: Choice,
+    scale: [f64; 8],
+    horizons_s: &[f64],
+) -> Option<f64> {
+    let one = |(flight, sums): (&Prepared, &Sums)| {
+        let arx = sums.arx(choice, flight.substeps).ok()?;
+        arx.scores(std::slice::from_ref(flight), scale, horizons_s).ok()
+    };
+    let scores: Option<Vec<Vec<HorizonScore>>> =
+        flights.par_iter().zip(others.par_iter()).map(one).collect();
+    let scores = scores?;
+    let logarithm = |horizon: usize| {
+        let reached = scores.iter().map(|s| &s[horizon]).filter(|s| s.runs > 0);
+        let errors: Vec<f64> = reached.map(|s| s.rmse_scaled).collect();
+        (!errors.is_empty()).then(|| mean(&errors).max(LEAST_ERROR).ln())
+    };
+    let logarithms: Vec<f64> = (0..horizons_s.len()).filter_map(logarithm).collect();
+    (!logarithms.is_empty()).then(|| mean(&logarithms).exp())
+}
+
+/// Number of unknowns of each state: the coefficients of the samples, and a constant.
+fn unknowns(order: usize) -> usize {
+    OF_SAMPLE * order + 1
+}
+
+/// Recorded states of `segment` at sample `at` and before it, the newest first, `order` in number. Before the first sample of
+/// the segment, the first state is repeated. Roll is continuous over ±180°.
+pub(super) fn past(segment: &[Instant], at: usize, order: usize) -> Vec<[f64; 8]> {
+    let newest = segment[at].state.to_array();
+    let one = |back: usize| {
+        let mut state = segment[at.saturating_sub(back)].state.to_array();
+        state[0] = newest[0] + error(&newest, &state)[0];
+        state
+    };
+    (0..order).map(one).collect()
+}
+
+/// States and deflections of the present sample and of those before it, the newest first, and 1 for the constant. `flown` has
+/// the samples of the segment up to the present one.
+fn regressors(past: &[[f64; 8]], flown: &[Instant]) -> DVector<f64> {
+    let present = flown.len() - 1;
+    let mut row = Vec::with_capacity(unknowns(past.len()));
+    for (back, state) in past.iter().enumerate() {
+        let c = flown[present.saturating_sub(back)].controls;
+        let rudder = if c.rudder.is_finite() { c.rudder } else { 0.0 };
+        row.extend_from_slice(state);
+        row.extend_from_slice(&[c.aileron, c.elevator, c.throttle, rudder]);
+    }
+    row.push(1.0);
+    DVector::from_vec(row)
+}
+
+/// Sums of products of a least-squares fit.
+struct Sums {
+    /// Products of two regressors.
+    gram: DMatrix<f64>,
+    /// Products of a regressor (row) and the rate of a state (column).
+    moments: DMatrix<f64>,
+    /// Number of steps between samples in the sums.
+    rows: usize,
+}
+
+impl Sums {
+    /// Sums over all samples of `flights` that have `order` − 1 samples before them and one after them; `order` is at least 1.
+    fn of<'a>(flights: impl Iterator<Item = &'a Prepared>, order: usize) -> Sums {
+        let size = unknowns(order);
+        let (gram, moments) = (DMatrix::zeros(size, size), DMatrix::zeros(size, 8));
+        let mut sums = Sums { gram, moments, rows: 0 };
+        for flight in flights {
+            for segment in &flight.segments {
+                for at in order - 1..segment.len().saturating_sub(1) {
+                    let states = past(segment, at, order);
+                    let row = regressors(&states, &segment[..=at]);
+                    let step = error(&states[0], &segment[at + 1].state.to_array());
+                    let rate = DVector::from_column_slice(&step.map(|x| x / flight.dt));
+                    sums.gram.ger(1.0, &row, &row, 1.0);
+                    sums.moments.ger(1.0, &row, &rate, 1.0);
+                    sums.rows += 1;
+                }
+            }
+        }
+        sums
+    }
+
+    /// The model with the order of the sums and the ridge of `choice`.
+    fn arx(&self, choice: Choice, substeps: usize) -> Result<Arx, ArxError> {
+        let Choice { order, ridge } = choice;
+        let needed = unknowns(order);
+        if self.rows < needed {
+            return Err(ArxError::TooLittle { order, rows: self.rows, needed });
+        }
+        let slopes = self.slopes(ridge).ok_or(ArxError::NotFinite { order })?;
+        Ok(Arx { order, substeps, slopes })
+    }
+
+    /// Derivatives of the rates with respect to the regressors, with a `ridge` in the sense of [`Choice::ridge`]. `None` if one
+    /// is not finite.
+    fn slopes(&self, ridge: f64) -> Option<DMatrix<f64>> {
+        let size = self.gram.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
+        let size = DMatrix::from_diagonal(&size);
+        let mut scaled = &size * &self.gram * &size;
+        for k in 0..scaled.nrows() {
+            scaled[(k, k)] += ridge;
+        }
+        let solved = scaled.svd(true, true).solve(&(&size * &self.moments), RANK).ok()?;
+        let slopes = (size * solved).transpose();
+        slopes.iter().all(|x| x.is_finite()).then_some(slopes)
+    }
+}
+
+#[cfg(test)]
+mod tests;
