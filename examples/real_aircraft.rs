@@ -1,8 +1,10 @@
-//! Free-run error 1, 2 and 5 s ahead on flights held out, of every real aircraft in `tests/data`, beside what a model must beat:
+//! Computes errors of open-loop simulations over 1, 2 and 5 s on held-out flights of every real aircraft in `tests/data`. Simple
+//! forecasts are included for comparison:
 //! `cargo run --release --ignore-rust-version --features sitl --example real_aircraft > results/real-aircraft.txt`.
 //!
-//! A flight (of the A430), or a half of a flight (of the others), is held out in turn. All choices are made without it: the
-//! structure of the fit by leaving out one of the flights fitted, or one of three parts of a single one.
+//! Each flight of the A430, and each half of the single flight of the other aircraft, is held out in turn. All choices are
+//! made without it. The structure of the fit is chosen by cross-validation over the other flights, or over three parts of a
+//! single flight.
 
 use std::path::Path;
 
@@ -24,13 +26,13 @@ use greylag::sysid::weak_form::windows;
 use nalgebra::{DMatrix, DVector};
 
 const HORIZONS_S: [f64; 3] = [1.0, 2.0, 5.0];
-/// Singular values below this part of the largest are taken as zero.
+/// Singular values below this fraction of the largest count as zero.
 const RANK: f64 = 1e-6;
-/// What is judged, in the order of the table.
+/// The compared models and forecasts, in the order of the table.
 const WAYS: [&str; 6] =
     ["from geometry", "fitted", "least squares", "hold the state", "straight on", "ARX"];
 
-/// Free-run errors of every way at every horizon; NaN where no run gets there.
+/// Errors of every model and forecast at every horizon; NaN if no simulation is long enough.
 type Errors = [[f64; HORIZONS_S.len()]; WAYS.len()];
 
 struct Aircraft {
@@ -69,7 +71,7 @@ fn print(all: &[Errors]) {
     }
 }
 
-/// Mean and standard error of what is known.
+/// Mean and standard error of the finite values, as text.
 fn cell(errors: &[f64]) -> String {
     let known: Vec<f64> = errors.iter().copied().filter(|x| x.is_finite()).collect();
     let n = known.len() as f64;
@@ -82,7 +84,7 @@ fn cell(errors: &[f64]) -> String {
     }
 }
 
-/// Errors on `test` of all ways, made of `fit` alone, and the structure that was chosen.
+/// Errors on `test` of all models and forecasts, which are fitted to `fit` alone, and the chosen structure.
 fn judged(
     model: &GreyBox,
     fit: &[Reconstruction],
@@ -109,7 +111,8 @@ fn judged(
     Ok((errors, chosen))
 }
 
-/// `model` fitted to all of `fit` with the structure that predicts parts of it best that are left out, and what that is.
+/// `model` fitted to all of `fit`, and the name of the structure of the fit. It is the structure with the smallest
+/// cross-validation error on parts of `fit`.
 fn fitted(model: &GreyBox, fit: &[Reconstruction]) -> Result<(GreyBox, String)> {
     let of = |per_flight: PerFlight| Fitted::Coefficients { effects: Vec::new(), per_flight };
     let axes = PerFlight { askew_deg: Some(3.0), ..PerFlight::default() };
@@ -134,7 +137,7 @@ fn fitted(model: &GreyBox, fit: &[Reconstruction]) -> Result<(GreyBox, String)> 
     Ok((amended.model, structures[chosen].name.clone()))
 }
 
-/// Three parts of a flight of the same length.
+/// Splits a flight into three parts of equal duration.
 fn thirds(flight: &Reconstruction) -> Vec<Reconstruction> {
     let all: usize = flight.segments.iter().map(|s| s.instants.len()).sum();
     let mut parts = vec![Vec::new(); 3];
@@ -159,8 +162,8 @@ fn thirds(flight: &Reconstruction) -> Vec<Reconstruction> {
         .collect()
 }
 
-/// `model` with coefficients by plain least squares of forces and moments over windows of 0.37 s, within their bounds and
-/// without a prior; channels by what the model as given leaves in each.
+/// `model` with coefficients from ordinary least squares on forces and moments over windows of 0.37 s, without a prior. The
+/// channels are weighted with the inverse rms residual of the given model. The coefficients are limited to their bounds.
 fn least_squares(model: &GreyBox, flights: &[Prepared]) -> GreyBox {
     let count = model.coefficients().len();
     let (mut rows, mut right) = (Vec::new(), Vec::new());
@@ -235,8 +238,8 @@ fn proto() -> Result<Aircraft> {
     )
 }
 
-/// An aircraft of which nothing but mass (kg), span (m), area (m²) and perhaps thrust at rest (N) and pitch speed (m/s) are known, with
-/// its flights `fit.csv` and `test.csv`.
+/// An aircraft with its flights `fit.csv` and `test.csv`. Only mass (kg), span (m) and area (m²) are known, and for some
+/// aircraft the static thrust (N) and the pitch speed of the propeller (m/s).
 fn of_halves(
     name: &'static str,
     folder: &str,
@@ -244,7 +247,7 @@ fn of_halves(
     thrust: Option<[f64; 2]>,
 ) -> Result<Aircraft> {
     let weight = 9.80665 * mass;
-    // half the weight, and twice the airspeed of level flight at a lift coefficient of 0.6, as `aircraft new` guesses
+    // as in `greylag aircraft new`: half of the weight, and twice the airspeed of level flight at a lift coefficient of 0.6
     let guess = [0.5 * weight, 2.0 * (2.0 * weight / (1.225 * area * 0.6)).sqrt()];
     let [static_thrust, pitch_speed] = thrust.unwrap_or(guess);
     let travel = 25f64.to_radians();

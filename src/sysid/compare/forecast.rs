@@ -10,7 +10,7 @@ use crate::weak_form::prepared::Prepared;
 
 /// Number of regressors of the linear model: eight states, aileron, elevator, throttle, rudder and a constant.
 const REGRESSORS: usize = 13;
-/// Singular values below this share of the largest are treated as zero, for example those of a rudder that never
+/// Singular values of the normalised Gram matrix below this are treated as zero, for example that of a rudder that never
 /// moves.
 const RANK: f64 = 1e-9;
 
@@ -30,7 +30,7 @@ enum Forecast {
     /// Attitude, airspeed and flow angles are held at their initial values. The body rates are zero.
     Straight,
     /// A first-order linear model with the controls as inputs (ARX), fitted by least squares. The function `forecasts` fits
-    /// this model to the same flights on which it computes the error. This error is therefore optimistic.
+    /// this model to the flights on which it computes the error. This error is therefore optimistic.
     Linear(DMatrix<f64>),
 }
 
@@ -58,7 +58,8 @@ impl Forecast {
         }
     }
 
-    /// One run from sample `start` of `segment`. The run is sampled after each number of steps in `looks`.
+    /// One run from sample `start` of `segment`. Returns the measured and predicted state after each number of steps in
+    /// `looks`.
     fn run(
         &self,
         segment: &[Instant],
