@@ -1,13 +1,15 @@
-//! Prints which aircraft of a JSBSim tree import, fly level and are flown by the LQI, with the reason for each that does not.
+//! Imports the aircraft of a JSBSim folder and flies each with an LQI designed from its imported model. Prints which aircraft
+//! can be imported and flown, and the reason for each that cannot.
 //!
 //! ```text
 //! cargo run --release --ignore-rust-version --no-default-features --features sitl \
 //!     --example aircraft_that_import -- TREE/aircraft [--no-flights] [NAME…]
 //! ```
 //!
-//! Each is imported at 1000 m, at the airspeed of level flight at a lift coefficient of 0.4, and flown for 20 s from there
-//! in its own simulator: straight, then in a bank of 20°, the surfaces moving by a tenth of their travel for 15 s. Beside the error at the end
-//! stands the state whose rate the model misses most: rms over the flight in parts of the state's scale x_c a second.
+//! Each aircraft is imported at an altitude of 1000 m and at the airspeed of level flight with a lift coefficient of 0.4. It is
+//! then flown in JSBSim for 20 s: first straight, then with a bank of 20°. Sines of a tenth of full command are added for the
+//! first 15 s. The program prints the attitude error at the end. It also prints the state whose rate the model predicts
+//! worst, with the rms error of this rate as a percentage of the state's scale x_c per second.
 
 use std::path::{Path, PathBuf};
 
@@ -22,11 +24,11 @@ use greylag::sim::one_step::{Flight, errors};
 use greylag_sitl::plant::discovery::steered;
 use greylag_sitl::plant::{PlantOptions, Start};
 
-/// Where the aircraft are imported and flown, m.
+/// Altitude at which the aircraft are imported and flown, m.
 const ALTITUDE_M: f64 = 1000.0;
 /// Lift coefficient in the flight.
 const LIFT: f64 = 0.4;
-/// 20 s in which surfaces and throttle move for the first 15: for as long as the attitude is not judged.
+/// A flight of 20 s. Sines are added to the commands for the first 15 s, and the attitude error is taken at the end.
 const FLIGHT: Flight = Flight {
     steps: 2000,
     moved: 1500,
@@ -34,7 +36,7 @@ const FLIGHT: Flight = Flight {
 };
 /// Names of the states.
 const STATES: [&str; 8] = ["roll", "pitch", "airspeed", "p", "q", "r", "alpha", "beta"];
-/// Attitude error at its end that counts as flown, degrees.
+/// An aircraft counts as flown if its attitude error at the end is below this value, degrees.
 const ENOUGH_DEG: f64 = 2.0;
 
 fn main() -> Result<()> {
@@ -73,7 +75,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The imported model, its aircraft, and what the model does not hold.
+/// Imports an aircraft. Returns the model, the options of its simulator, and the effects that the model does not represent.
 fn taken(folder: &Path, name: &str) -> Result<(GreyBox, PlantOptions, Vec<String>)> {
     let mut options = PlantOptions {
         aircraft_dir: Some(folder.to_owned()),
@@ -97,7 +99,10 @@ fn taken(folder: &Path, name: &str) -> Result<(GreyBox, PlantOptions, Vec<String
     Ok((model, options, found.left_out))
 }
 
-/// Flies straight, then banked by 20° while the surfaces are moved; what happened in words.
+/// Flies straight, then with a bank of 20°. Returns the attitude error and the worst rate error as text.
+///
+/// # Errors
+/// If the aircraft cannot be trimmed or simulated, or if the attitude error at the end is too large.
 fn fly(model: &GreyBox, plant: &PlantOptions) -> Result<String> {
     let airspeed = plant.start.airspeed_mps;
     let trim = Trim::straight(model, airspeed, ALTITUDE_M)?;

@@ -1,4 +1,4 @@
-//! Writes the report of a made-up amendment: `cargo run --example amendment_sample -- OUT.html`.
+//! Writes the report page of a synthetic amendment: `cargo run --example amendment_sample -- OUT.html`.
 
 #[path = "../tests/report/report_amendment.rs"]
 mod report_amendment;

@@ -1,5 +1,5 @@
-//! How long comparison or diagnosis of a ten-minute log takes, with the memory: `cargo run --release --example compare_speed`.
-//! `-- write FILE MINUTES` writes the log of such a flight only.
+//! Measures the time and the memory for the comparison and the diagnosis of a ten-minute log:
+//! `cargo run --release --example compare_speed`. With `-- write FILE MINUTES` the example only writes such a log.
 
 #[path = "../tests/support/compare.rs"]
 mod compare_support;
@@ -100,8 +100,9 @@ fn main() {
     println!("peak {} MB, the simulator and the log's text included", status_mb("VmHWM:"));
 }
 
-/// How long all candidates take on two minutes with an effect missing, their 100 nulls and the flexible model
-/// included: from one remark of the search to the next.
+/// Prints how long the ranking of all candidates takes on a log of two minutes, with an effect missing from the model. The
+/// time includes the 100 surrogate data sets without an effect (nulls) and the flexible model. It is taken between two
+/// progress reports of the search.
 fn ranking() {
     let log = fly(2, 120.0, REALISTIC);
     let mut model = model("jsbsim");
@@ -124,7 +125,7 @@ fn ranking() {
     println!("{} on two minutes, with 100 nulls, in {seconds:.2} s", remarks[at].0);
 }
 
-/// A line of `/proc/self/status`, in MB; 0 where there is none.
+/// The value of the line `key` of `/proc/self/status`, MB; 0 if there is no such line.
 fn status_mb(key: &str) -> u64 {
     let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = text.lines().find(|l| l.starts_with(key)).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Writes the report of a made-up comparison: `cargo run --example comparison_sample -- OUT.html`.
+//! Writes the report page of a synthetic comparison: `cargo run --example comparison_sample -- OUT.html`.
 
 #[path = "../tests/report/report_comparison.rs"]
 mod synthetic;
@@ -10,7 +10,7 @@ use greylag::report::{ComparisonReport, write_new};
 
 fn main() -> anyhow::Result<()> {
     let out = std::env::args_os().nth(1).context("say where: comparison_sample OUT.html")?;
-    // Ten minutes in all, the length that the page is sized for.
+    // two flights of together ten minutes, the duration for which the page is designed
     let comparison = synthetic::comparison(300.0);
     let report = ComparisonReport {
         title: "Synthetic comparison".into(),

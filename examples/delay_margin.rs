@@ -1,15 +1,15 @@
-//! Measures how much pure input delay each controller bears before its pitch or roll loop swings by itself.
+//! Measures the largest pure input delay at which the pitch and roll loops of each controller remain stable.
 //!
 //! ```text
 //! cargo run --release --ignore-rust-version --no-default-features --features sitl --example delay_margin
 //! ```
 //!
-//! Further designs of the LQI are tried by their weights, as `attitude,integral,rate,sideslip,deflection`.
+//! Arguments add LQI designs with other weights, each as `attitude,integral,rate,sideslip,deflection`.
 //!
-//! JSBSim flies in steps of a millisecond. The controller runs at 100 Hz on the true state; its
-//! elevator, or its aileron, arrives later by the delay, which grows by 2 ms. `ardupilot` adds what
-//! ArduPlane puts into the loop: gyros filtered at 20 Hz, channels read at 50 Hz. A short pulse starts
-//! it: a small one shows the linear margin, full deflection the one that the slew limit leaves.
+//! JSBSim runs in steps of a millisecond. The controller runs at 100 Hz on the true state. Either its elevator command or its
+//! aileron command is delayed. The delay is increased in steps of 2 ms. The path `ardupilot` adds ArduPlane's parts of the
+//! loop: a filter of the gyros at 20 Hz, and channels that are read at 50 Hz. A short pulse on the surface excites the
+//! loop. A small pulse shows the margin of the linear loop. A pulse of full deflection shows the margin with the slew limit.
 
 use std::collections::VecDeque;
 use std::path::Path;
@@ -23,25 +23,25 @@ use greylag::physics::airframe::ActuatorFigures;
 use greylag::physics::{Command, Controls, State, Time};
 use greylag_sitl::plant::{Inputs, Plant, PlantOptions, Start, Truth};
 
-/// Steps of the plant in a cycle of the controller, and in a second.
+/// Number of plant steps in a cycle of the controller. `SECOND` is the number of plant steps in a second.
 const CYCLE: usize = 10;
 const SECOND: usize = 1000;
-/// Largest change of a surface in a cycle: the envelope's 20 /s.
+/// Largest change of a surface command (−1..1) in a cycle, from the envelope's limit of 20 per second.
 const SLEW: f64 = 0.2;
-/// Swing of a rate, from peak to peak over the last two seconds, that counts as unstable, rad/s.
+/// The loop counts as unstable if the body rate oscillates by more than this in the last two seconds, peak to peak, rad/s.
 const SWING: f64 = 0.17;
-/// Step of the delays, ms, and the longest delay below.
+/// Step of the delays, ms. `LONGEST_MS` is the longest delay, ms.
 const STEP_MS: usize = 2;
 const LONGEST_MS: usize = 200;
 
-/// The axis whose surface is late.
+/// The axis whose surface command is delayed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Axis {
     Pitch,
     Roll,
 }
 
-/// Element between state and surface besides the delay.
+/// Parts of the loop besides the delay: none, or those of ArduPlane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Between {
     Direct,
@@ -92,7 +92,8 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The least delay at which the axis swings on after the pulse.
+/// The smallest delay (ms) at which the axis still oscillates in the last two of ten seconds, or at which the aircraft is
+/// lost. `None` if there is none up to `LONGEST_MS`.
 fn margin_ms(
     controller: &mut dyn Controller,
     figures: ActuatorFigures,
@@ -139,14 +140,14 @@ fn settled_deg(
     Ok(sum / 2.0)
 }
 
-/// One flight with a late surface.
+/// One flight with a delayed surface command.
 struct Flight {
     plant: Plant,
     figures: ActuatorFigures,
     path: Between,
     axis: Axis,
     pulse: f64,
-    /// Commands on their way to the delayed surface.
+    /// Commands in transit to the delayed surface.
     late: VecDeque<f64>,
 }
 
@@ -182,7 +183,7 @@ impl Flight {
                 *y += filter * (x - *y);
             }
             if step % CYCLE == 0 {
-                // Beside real firmware nobody reports the surfaces: they are thought of as undelayed.
+                // real firmware does not report the surfaces, so the controller sees simulated surfaces without the delay
                 thought.step(&previous[0], &self.figures);
                 let actuators = thought.observed(&self.figures);
                 let seen = Observation { actuators, previous, ..observe(step, &truth, rates) };
@@ -199,7 +200,7 @@ impl Flight {
         Ok(())
     }
 
-    /// What the surfaces get: one of them late, with the pulse on it in the fourth second.
+    /// The commands that reach the surfaces. One of them is delayed, and the pulse is added to it after four seconds.
     fn delayed(&mut self, step: usize, command: Command) -> Inputs {
         let Command { mut aileron, mut elevator, throttle, .. } = command;
         let surface = if self.axis == Axis::Pitch { &mut elevator } else { &mut aileron };
@@ -212,7 +213,7 @@ impl Flight {
     }
 }
 
-/// Share of a new sample in a first-order low-pass of `hz` at a sample a millisecond.
+/// Weight of a new sample in a first-order low-pass filter with the corner frequency `hz`, at 1000 samples per second.
 fn share(hz: f64) -> f64 {
     1.0 - (-std::f64::consts::TAU * hz / SECOND as f64).exp()
 }

@@ -1,11 +1,12 @@
-//! Prints how far textbook and aerodynamic tools are from measured derivatives, and the widths that follow.
+//! Compares derivatives from textbook formulas and from aerodynamic tools with measured derivatives. Prints the prior standard
+//! deviations (widths) that follow from the errors.
 //!
 //! ```text
 //! cargo run --ignore-rust-version --no-default-features --example derivative_widths [-- --write]
 //! ```
 //!
-//! An error is counted as a share of the computed value, as a width is: (computed − measured) / |computed|. A guess counts as two
-//! aircraft: w² = (2 g² + Σ e²) / (2 + n).
+//! Errors e and widths w are relative to the computed value: e = (computed − measured) / |computed|. A guessed width g has the
+//! weight of two aircraft: w² = (2 g² + Σ e²) / (2 + n), with the number n of aircraft.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,12 +15,12 @@ use greylag::model::derivatives::widths::Tool;
 use greylag::model::derivatives::{Beside, read, reference};
 use greylag::model::textbook::{Measures, Tail};
 
-/// Result whose error may be one of a file or a number.
+/// Result with any error, such as that of reading a file or parsing a number.
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
-/// How many aircraft a guess counts as.
+/// Weight of a guessed width, as a number of aircraft.
 const GUESS: f64 = 2.0;
-/// JSON files of one aircraft, by tool.
+/// Suffixes of the JSON files of an aircraft, with the tools that wrote them.
 const FILES: [(&str, Tool); 4] = [
     ("optvl", Tool::OptVl),
     ("vortexlatticemethod", Tool::AeroSandboxLattice),
@@ -27,7 +28,7 @@ const FILES: [(&str, Tool); 4] = [
     ("liftingline", Tool::LiftingLine),
 ];
 
-/// A row of a table: its cells.
+/// A row of a table as its cells.
 type Row = Vec<String>;
 /// Computed values by aircraft, tool and derivative.
 type Computed = BTreeMap<(String, String, String), f64>;
@@ -65,7 +66,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// One aeroplane through every tool: our trainer.
+/// Prints the derivatives of one aircraft, the example `trainer`, as computed by every tool.
 fn cross_check(root: &Path) -> Result<()> {
     let measures = measures("trainer", 2.4, 1.8, 0.45, Tail::Conventional);
     let mut columns = vec![("textbook", coefficients(&measures.model())?)];
@@ -88,11 +89,11 @@ fn cross_check(root: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Columns of the table of errors.
+/// Families of tools, one per column of the printed table.
 const FAMILIES: [&str; 5] =
     ["textbook", "lattice", "aerosandbox-lattice", "aerobuildup", "lifting-line"];
 
-/// The widths as the file has them.
+/// The text of the file with the widths.
 fn widths(guesses: &[Row], errors: &BTreeMap<(&str, &str), Vec<f64>>) -> Result<String> {
     let mut out = "tool,derivative,width,aircraft,rms_error\n".to_owned();
     for row in guesses {
@@ -108,7 +109,7 @@ fn widths(guesses: &[Row], errors: &BTreeMap<(&str, &str), Vec<f64>>) -> Result<
     Ok(out)
 }
 
-/// Values from the textbook, from tools and from the authors' own runs.
+/// Derivatives computed by the textbook formulas, by the tools, and by the authors of `computed.csv`.
 fn computed(root: &Path) -> Result<Computed> {
     let mut all = Computed::new();
     for row in table(&root.join("params/widths/computed.csv"))? {
@@ -144,7 +145,7 @@ fn computed(root: &Path) -> Result<Computed> {
     Ok(all)
 }
 
-/// The ratios of a flying wing's elevons were taken from the X8: they cannot be judged by it.
+/// Derivatives of a flying wing that the textbook formulas take from the X8. Their errors are not computed for the X8.
 const TUNED: [&str; 6] = ["Clp", "Clda", "Cmde", "CLde", "Cmq", "Cnda"];
 
 fn measures(name: &str, mass: f64, span: f64, area: f64, tail: Tail) -> Measures {
@@ -161,7 +162,7 @@ fn measures(name: &str, mass: f64, span: f64, area: f64, tail: Tail) -> Measures
     }
 }
 
-/// The lines of a model file that are of the tool, not of the textbook.
+/// The lines of a model file whose values are from the tool, not from the textbook formulas.
 fn taken(model: &str, tool: Tool) -> String {
     let own = format!("source = \"{tool}\"");
     model.lines().filter(|line| line.contains(&own)).collect::<Vec<_>>().join("\n")
@@ -176,7 +177,7 @@ fn coefficients(model: &str) -> Result<Vec<(String, f64)>> {
     Ok(model.lines().filter_map(line).filter(|(name, _)| name.starts_with('C')).collect())
 }
 
-/// The rows of a file but its first; lines that begin with # are notes.
+/// The rows of a CSV file without its header. Lines that begin with # are comments and are omitted.
 fn table(path: &PathBuf) -> Result<Vec<Row>> {
     let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
     let lines = text.lines().filter(|line| !line.starts_with('#')).skip(1);

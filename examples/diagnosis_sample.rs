@@ -1,4 +1,4 @@
-//! Writes the report of a made-up diagnosis: `cargo run --example diagnosis_sample -- OUT.html`.
+//! Writes the report page of a synthetic diagnosis: `cargo run --example diagnosis_sample -- OUT.html`.
 
 #[path = "../tests/report/report_comparison.rs"]
 mod report_comparison;

@@ -1,13 +1,15 @@
-//! Days of flight in lockstep: memory that stays flat, counters that wrap, no cycle left out.
+//! Flies for a day or more in lockstep. Checks that memory does not grow, that wrapping counters are handled and that every
+//! cycle is answered.
 //!
 //! ```text
 //! cargo run --release --ignore-rust-version --no-default-features --features sitl --example endurance -- \
 //!     [--hours 24] [--sockets] [--opposite sitl|px4|ardupilot]
 //! ```
-//! Without `--sockets` the companion and the vehicle are in this process, bytes in, bytes out, at a
-//! thousand times real time. With it they are what flies: threads, UDP sockets, a client, at a hundred
-//! times real time. The vehicle's clock starts half the flight before its u32 of milliseconds wraps; its
-//! microseconds wrap as i32 after 35.8 minutes, as u32 after 71.6; sequence numbers every few seconds.
+//! Without `--sockets` the companion and the vehicle exchange bytes within this process, at about a thousand times real time.
+//! With `--sockets` they run as in flight, with threads, UDP sockets and a client, at about a hundred times real time.
+//!
+//! The vehicle's clock starts so that its 32-bit counter of milliseconds wraps in the middle of the flight. Its microseconds
+//! wrap after 35.8 minutes as i32 and after 71.6 minutes as u32. Sequence numbers wrap every few seconds.
 
 use std::net::{Ipv4Addr, UdpSocket};
 use std::path::Path;
@@ -35,15 +37,15 @@ use greylag_sitl::shim::{self, Launch, Noise, Personality, ShimOptions};
 
 /// Period of a 32-bit counter of milliseconds, s.
 const WRAP_S: f64 = 4_294_967.296;
-/// Between two legs, s.
+/// Duration of a leg, s.
 const LEG_S: u64 = 30;
-/// Legs: roll and pitch, degrees, climbing as much as descending.
+/// Roll and pitch of the legs, degrees. Climbs and descents balance.
 const LEGS: [(f64, f64); 4] = [(0.0, 2.0), (35.0, 5.0), (0.0, 2.0), (-35.0, 0.0)];
-/// Growth of memory that is still flat, bytes: pages that a heap spreads over.
+/// Largest accepted growth of memory, bytes. It allows for the fragmentation of the heap.
 const FLAT: u64 = 2 << 20;
-/// VFR_HUD, which holds the altitude in its third word, m.
+/// Id of the message VFR_HUD, which has the altitude (m) in its third 32-bit word.
 const VFR_HUD: u32 = 74;
-/// Altitude bounds: outside them the pitch of the legs is corrected, m.
+/// Range of altitudes, m. Outside it the pitch of the legs is corrected.
 const ALTITUDE_M: (f64, f64) = (300.0, 900.0);
 
 fn main() -> Result<ExitCode> {
@@ -150,7 +152,7 @@ fn in_process(model: &GreyBox, hours: f64, opposite: &str) -> Result<()> {
         let mut ticked = 0;
         desk.receive(host, &down, &mut up, |_, _| ticked += 1);
         ticks += ticked;
-        // Every state must have its command within its own step, once the stream has begun.
+        // after the first state, every state must be answered by a command within its own step
         late += u64::from(ticks > 0 && ticked != 1);
         let (roll, pitch) = leg(step / (100 * LEG_S), truth.altitude_m);
         if step % 10 == 0 {
@@ -168,7 +170,7 @@ fn in_process(model: &GreyBox, hours: f64, opposite: &str) -> Result<()> {
             }
             desk.pilot().attitude_setpoint(now, setpoint);
         }
-        // The second half of each leg is settled.
+        // the attitude is settled in the second half of each leg
         if armed && step > 6000 && step % (100 * LEG_S) > 50 * LEG_S {
             worst = worst.max((truth.roll_rad.to_degrees() - roll).abs());
         }
@@ -207,7 +209,7 @@ fn in_process(model: &GreyBox, hours: f64, opposite: &str) -> Result<()> {
     Ok(())
 }
 
-/// Roll and pitch of a leg, degrees, corrected where the aircraft is too high or too low.
+/// Roll and pitch of a leg, degrees. The pitch is corrected if the aircraft is too high or too low.
 fn leg(number: u64, altitude_m: f64) -> (f64, f64) {
     let (roll, pitch) = LEGS[number as usize % LEGS.len()];
     let pitch = match altitude_m {
@@ -234,7 +236,7 @@ fn through_sockets(model: &GreyBox, hours: f64) -> Result<()> {
         delay_margin: None,
         signing: None,
     };
-    // The aircraft's minute is half a second of the client's.
+    // a minute of the aircraft's time is about half a second of the client's
     let config = Config { offboard_loss_s: 60.0, ..Config::for_model(model)? };
     let controller = build(ControllerKind::Lqi, model)?;
     let pilot = Pilot::new(config, controller.boxed_clone())?;
@@ -279,8 +281,8 @@ fn through_sockets(model: &GreyBox, hours: f64) -> Result<()> {
 
 type Simulation = std::thread::JoinHandle<Result<shim::Summary, shim::ShimError>>;
 
-/// Steers until the simulation is over; gives the memory after ten seconds, and how often OFFBOARD
-/// was entered.
+/// Sends setpoints until the simulation has ended. Returns the resident memory after ten seconds (bytes) and the number of
+/// times that OFFBOARD was entered.
 fn steer(companion: std::net::SocketAddr, simulation: &Simulation) -> Result<(u64, u32)> {
     let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
     socket.connect(companion)?;
@@ -309,7 +311,7 @@ fn steer(companion: std::net::SocketAddr, simulation: &Simulation) -> Result<(u6
             early = Some(resident()?);
         }
         let mut datagram = [0; 2048];
-        // A time-out is no news.
+        // after a time-out there are no bytes to read
         let length = socket.recv(&mut datagram).unwrap_or(0);
         for frame in Frames::new(&datagram[..length], &mut FrameCounts::default()) {
             if let (VFR_HUD, Some(&[a, b, c, d])) = (frame.id, frame.payload.get(8..12)) {

@@ -1,4 +1,5 @@
-//! A log read, reconstructed, compared, diagnosed and fitted with the library, an effect of one's own among the candidates:
+//! Uses the library to read a log, reconstruct the flight, diagnose the model, fit it and compare the results. An own effect
+//! can be added to the candidates:
 //! `cargo run --release --ignore-rust-version --no-default-features --example fit_a_log -- MODEL.toml FIT.csv JUDGE.csv [EFFECT.toml]`.
 
 use std::path::Path;
@@ -12,7 +13,7 @@ use greylag::sysid::flight_path::{self, reconstruct};
 use greylag::sysid::progress::ignore_progress;
 use greylag::sysid::{amend, compare, diagnose};
 
-/// The flight in a log of any format, with what its sensors' constants are.
+/// Reads a log of any format and reconstructs its flight with the constant sensor errors.
 fn flight(path: &str, model: &GreyBox) -> anyhow::Result<Reconstruction> {
     let log = logs::load(Path::new(path), &Default::default())?;
     println!("{path}: {} samples", log.flight.samples.len());
@@ -23,7 +24,7 @@ fn flight(path: &str, model: &GreyBox) -> anyhow::Result<Reconstruction> {
     Ok(reconstruct(&log.flight, &options)?)
 }
 
-/// The error of a free run of 5 s, in parts of the state's scale.
+/// RMS error of open-loop simulations of 5 s, where the error of each state is divided by its scale x_c.
 fn error(model: &GreyBox, flight: &Reconstruction) -> anyhow::Result<f64> {
     let options = compare::Options { horizons_s: vec![5.0], seed: 1 };
     let models = std::slice::from_ref(model);

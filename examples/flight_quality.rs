@@ -1,26 +1,27 @@
-//! Measures how controllers fly on the way to a target: error, overshoot, surface travel, load factor, incidence.
+//! Measures how controllers fly to a target: error, overshoot, surface travel, load factor, angle of attack.
 //!
 //! ```text
 //! cargo run --release --ignore-rust-version --no-default-features --features sitl --example flight_quality -- \
 //!     lqi hybrid-lqi ilqr hybrid-ilqr every=7 steps=200
 //! ```
 //!
-//! JSBSim flies; load factor, angle of attack and sideslip are its own, not the model's. Every controller flies `every`-th target
-//! of `params/targets.csv` from level at the reference airspeed for 10 s, then `steps` steps between seeded random attitudes at the
-//! cruise airspeed, 5 s each, ten in a row. `hybrid-ilqr:KEY=VALUE,…` changes its settings, `NAME+free` flies without the limiter.
+//! JSBSim simulates the flights and gives load factor, angle of attack and sideslip. Every controller flies to every N-th target
+//! of `params/targets.csv` (`every=N`), for 10 s from level flight at the reference airspeed. It then flies N steps between
+//! random attitudes (`steps=N`) at the cruise airspeed, 5 s each, ten in a row. `hybrid-ilqr:KEY=VALUE,…` changes settings of
+//! this controller. `NAME+free` flies without the envelope limiter.
 //!
 //! | word | meaning |
 //! |---|---|
-//! | `model=FILE` `policy=DIR` | what the controllers are built from |
+//! | `model=FILE` `policy=DIR` | model and policy from which the controllers are built |
 //! | `aircraft=NAME` | JSBSim's aircraft |
-//! | `every=N` `steps=N` | how much is flown; 0 leaves it out |
+//! | `every=N` `steps=N` | targets and steps that are flown; 0 for none |
 //! | `turbulence=N` | MIL-spec severity: 3 light, 4 moderate |
 //! | `delay=N` | commands arrive N ticks of 10 ms late |
 //! | `trace=FILE` | appends every tick: controller, time, target, roll, pitch, p, q, r (°, °/s), airspeed, α, load factor, commands |
-//! | `seed=N` | seed of the steps and of the air |
-//! | `draws=N` | the controllers are built from N models drawn from the coefficients' widths, each with flights of its own |
+//! | `seed=N` | seed of the steps and of the turbulence |
+//! | `draws=N` | builds the controllers from N models with randomly drawn coefficients, each with its own flights |
 //!
-//! Times are processor time of the thread, so that other programs count little.
+//! The computing time is the processor time of the thread, which other programs hardly affect.
 
 use std::collections::VecDeque;
 use std::io::Write;
@@ -49,10 +50,10 @@ const STEP: f64 = 0.01;
 const G0: f64 = 9.80665;
 /// Settled error beyond which the aircraft counts as lost, degrees.
 const LOST_DEG: f64 = 10.0;
-/// Ticks of a flight from level, and of a step.
+/// Number of ticks of a flight to a target from level flight. `SHORT` is the number of ticks of a step.
 const FLIGHT: usize = 1000;
 const SHORT: usize = 500;
-/// Steps flown in a row.
+/// Number of steps flown in a row, after which the aircraft is reset.
 const ROW: usize = 10;
 
 #[derive(Clone)]
@@ -110,7 +111,7 @@ struct Measured {
     quality: Quality,
 }
 
-/// An aircraft in JSBSim with commands on their way to it.
+/// An aircraft in JSBSim, with the delayed commands that have not reached it yet.
 struct World {
     plant: Plant,
     start: Begin,
@@ -143,7 +144,7 @@ impl World {
             delay: o.delay,
             previous: [Command::IDLE; 2],
             truth,
-            // the limiter's own least load factor, where the file states none
+            // if the file states no smallest load factor, that of the limiter is used
             limits: Limits { load_factor: Bounds::of(airframe).load, ..Limits::of(airframe) },
         })
     }
@@ -196,7 +197,7 @@ impl World {
     }
 }
 
-/// One controller over what has to be flown.
+/// All flights of one controller in one group of targets.
 struct Flown {
     group: &'static str,
     flights: Vec<Measured>,
@@ -239,7 +240,8 @@ fn load_factor(t: &Truth) -> f64 {
     -t.specific_force_mps2[2] / G0
 }
 
-/// Flies `ticks` to a target and measures them; the aircraft is lost where JSBSim fails or the attitude is still far off at the end.
+/// Flies to a target for `ticks` ticks and measures the quality. The aircraft counts as lost if JSBSim fails, or if the
+/// settled error exceeds `LOST_DEG`.
 fn leg(
     o: &Options,
     world: &mut World,
@@ -358,7 +360,7 @@ fn print(name: &str, all: &[Flown], times: &[f64]) {
         };
         let count = |f: &dyn Fn(&Quality) -> bool| flights.iter().filter(|m| f(&m.quality)).count();
         let integral = |q: &Quality| q.error_integral_deg_s;
-        // the ranks between which the median of such a sample lies in 95 % (binomial, normal approximation)
+        // ranks of the 95 % interval of the median (binomial distribution, normal approximation)
         let half = 0.98 / (flights.len() as f64).sqrt();
         let interval = [0.5 - half, 0.5 + half].map(|q| of(&integral, q.clamp(0.0, 1.0)));
         println!(
@@ -432,7 +434,7 @@ fn main() -> Result<()> {
         let (mut all, mut times, mut means) = (Vec::new(), Vec::new(), Vec::new());
         for (k, model) in models.iter().enumerate() {
             let mut controller = entrant(name, model, agent.as_ref())?;
-            // each drawn model flies steps of its own
+            // the steps differ between the drawn models
             let own = Options { seed: o.seed + 1000 * k as u32, ..o.clone() };
             let (flown, of) = fly(&own, &model.airframe, controller.as_mut())?;
             means.push(mean(flown.iter().flat_map(|f| &f.flights)));
@@ -461,7 +463,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The model itself, or the drawn ones of which an LQI can be built.
+/// The model itself, or the drawn models from which an LQI can be designed.
 fn models(o: &Options, model: GreyBox) -> Vec<GreyBox> {
     if o.draws == 0 {
         return vec![model];
@@ -493,7 +495,8 @@ fn mean<'a>(flights: impl Iterator<Item = &'a Measured>) -> f64 {
     statistics::mean(&flights.map(|m| m.quality.error_integral_deg_s).collect::<Vec<_>>())
 }
 
-/// The controller of a word: `NAME`, or `hybrid-ilqr:KEY=VALUE,…` with other settings; `+free` leaves the envelope limiter out.
+/// The controller that `word` names: `NAME`, or `hybrid-ilqr:KEY=VALUE,…` with other settings. The suffix `+free` omits the
+/// envelope limiter.
 fn entrant(word: &str, model: &GreyBox, agent: Option<&Agent>) -> Result<Box<dyn Controller>> {
     let (word, free) = word.strip_suffix("+free").map_or((word, false), |word| (word, true));
     let bare = match word.split_once(':') {
@@ -511,7 +514,7 @@ fn entrant(word: &str, model: &GreyBox, agent: Option<&Agent>) -> Result<Box<dyn
     Ok(if free { bare } else { Box::new(Guarded::new(bare, model)) })
 }
 
-/// The settings of `hybrid-ilqr` with `changes`, KEY=VALUE with commas between.
+/// The settings of `hybrid-ilqr` with `changes`, which are KEY=VALUE separated by commas.
 fn settings(changes: &str) -> Result<Settings> {
     let mut s = Settings::HYBRID;
     for change in changes.split(',') {

@@ -1,10 +1,11 @@
-//! Fuzzing by the hundred million: seeded mutations, fed to parsers, handlers, loaders.
+//! Fuzzing with about a hundred million inputs. The inputs are seeded mutations, which are passed to parsers, message handlers
+//! and file loaders.
 //!
 //! ```text
 //! cargo run --release --ignore-rust-version --no-default-features --features sitl --example fuzz -- [SEED [SHARE]]
 //! ```
-//! SHARE scales the number of inputs, 1 being 1.0e8; every target counts its own, and one that panics
-//! prints the seed of the batch: `-- SEED 0 TARGET` feeds that batch alone again.
+//! SHARE scales the number of inputs; with 1 there are 1.0e8 inputs in total. A target that panics prints the seed of the
+//! batch of inputs. `-- SEED 0 TARGET` repeats only this batch.
 
 #[path = "../tests/link/fuzz_support.rs"]
 mod fuzz_support;
@@ -16,7 +17,7 @@ use std::time::Instant;
 
 use fuzz_support::{Target, feed};
 
-/// Inputs of each target at a share of 1: as many as a target is fast.
+/// Number of inputs of each target at SHARE = 1. Faster targets get more inputs.
 const SHARES: [(Target, f64); 7] = [
     (Target::Parser, 88e6),
     (Target::Clients, 6e6),

@@ -1,4 +1,5 @@
-//! Reads broken effect files, a million or as many as are asked for, and prints how they were refused.
+//! Reads randomly damaged effect files and prints how many were refused with the place of the fault. The first argument is the
+//! number of files (default one million), the second the seed.
 //!
 //! `cargo run --release --ignore-rust-version --no-default-features --example fuzz_effect_files -- 1000000 1`
 

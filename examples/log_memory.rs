@@ -1,7 +1,7 @@
-//! Peak memory and time of a look at a flight log: `cargo run --release --example log_memory -- FILE`.
+//! Measures the peak memory and the time of `inspect_all` on a flight log: `cargo run --release --example log_memory -- FILE`.
 //!
-//! Peak memory is VmHWM of /proc/self/status, so that it runs on Linux only. Beside it, for the same file:
-//! `/usr/bin/time -v python -c "from pyulog import ULog; ULog('FILE', ['vehicle_attitude', …])"`.
+//! The peak memory is VmHWM of /proc/self/status. The example therefore runs only on Linux. For comparison, pyulog reads the
+//! same file with `/usr/bin/time -v python -c "from pyulog import ULog; ULog('FILE', ['vehicle_attitude', …])"`.
 
 use std::path::Path;
 use std::time::Instant;

@@ -1,13 +1,12 @@
-//! Real-time figures through MAVLink: shim, companion and client over real sockets.
+//! Measures latency and settled error through MAVLink, with simulator (shim), companion and client over UDP sockets.
 //!
 //! ```text
 //! cargo run --release --ignore-rust-version --no-default-features --features sitl --example mavlink_timing
 //! ```
-//! It flies a minute in real time, then five minutes of flight in lockstep, prints what it
-//! measured, and ends with an error when a wanted figure is missed. An idle machine is part of
-//! the measurement. `--controller hybrid` flies a planner, whose plans are counted (`--planner
-//! delay=yes` and the like change it); `--load 2` keeps two threads busy meanwhile: plans may be
-//! late then, the attitude has to be held.
+//! The example flies for one minute in real time, then for five minutes of flight time in lockstep. It prints the results and
+//! fails if a requirement is not met. The machine must be idle. `--controller hybrid` flies a planner, and late plans are
+//! counted. `--planner KEY=VALUE` changes the planner's settings. `--load 2` keeps two threads busy during the flight. Plans
+//! may then be late, but the attitude must be held.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::path::Path;
@@ -34,25 +33,25 @@ use greylag::sim::{Episode, Simulator};
 use greylag_sitl::plant::{PlantOptions, Start};
 use greylag_sitl::shim::{self, ShimOptions};
 
-/// The attitude that is flown, degrees: an easy target of the paper.
+/// Commanded roll, degrees. With the pitch `PITCH_DEG` it is an easy target of the paper.
 const ROLL_DEG: f64 = 30.0;
 const PITCH_DEG: f64 = 10.0;
 /// Length of the flight in real time, s.
 const REAL_TIME_S: f64 = 60.0;
 /// Length of the flight in lockstep, s.
 const LOCKSTEP_S: f64 = 300.0;
-/// Cycles of an episode in process, with how many at its end the settled error is taken over.
+/// Number of cycles of an episode. `SETTLED` is the number of its last cycles over which the settled error is computed.
 const EPISODE: usize = 1000;
 const SETTLED: usize = 200;
-/// Longest p99 from a state frame to its command, µs, of a controller in the loop.
+/// Largest accepted 99th percentile of the time from a state frame to its command, µs, for a controller in the control loop.
 const P99_US: f64 = 2000.0;
-/// Longest median and p99.9 of a planner, µs.
+/// Largest accepted median and 99.9th percentile of this time for a planner, µs.
 const PLAN_US: [f64; 2] = [5000.0, 10_000.0];
-/// Largest roll or pitch error on a loaded machine once the target has been flown for ten seconds, degrees.
+/// Largest accepted roll or pitch error on a loaded machine, from ten seconds after the target was given, degrees.
 const HELD_DEG: f64 = 2.0;
-/// How far the settled error may be from that in process, degrees.
+/// Largest accepted difference between the settled errors through MAVLink and in process, degrees.
 const AGREEMENT_DEG: f64 = 0.05;
-/// Least ratio of lockstep to real time.
+/// Smallest accepted ratio of flight time to wall time in lockstep.
 const SPEED: f64 = 20.0;
 
 /// Results of a flight.
@@ -62,7 +61,7 @@ struct Flown {
     shim: shim::Summary,
 }
 
-/// Real-time figures through MAVLink.
+/// Measures latency and settled error through MAVLink.
 #[derive(Parser)]
 struct Arguments {
     /// Controller that flies the aircraft.
@@ -71,7 +70,7 @@ struct Arguments {
     /// Settings of a planner that differ from the defaults.
     #[arg(long, num_args = 1.., value_name = "KEY=VALUE")]
     planner: Vec<Change>,
-    /// Threads that are kept busy meanwhile.
+    /// Number of threads that are kept busy during the flight.
     #[arg(long, default_value_t = 0)]
     load: usize,
 }
@@ -113,7 +112,7 @@ fn told([early, late]: [f64; 2]) -> String {
     format!("{early:.4} deg after 10 s, {late:.4} at the end")
 }
 
-/// Requirements on the flight in real time, and whether they were met.
+/// The requirements on the flight in real time as text, each with whether it was met.
 fn real_time(
     real: &Flown,
     kind: ControllerKind,
@@ -131,7 +130,7 @@ fn real_time(
         );
         return Ok(vec![(worst <= HELD_DEG, words)]);
     }
-    // Late answers, frames that did not come, steps that the shim made without a new answer.
+    // late commands, lost state frames, and steps that the shim made without a new command
     let missed = timing.missed + real.companion.vehicle.lost + real.shim.unanswered_steps;
     let quantile = |q: f64| timing.latency.quantile_us(q);
     let (p50, p99, p999) = (quantile(0.5), quantile(0.99), quantile(0.999));
@@ -155,7 +154,7 @@ fn real_time(
     ])
 }
 
-/// Threads that do nothing but work.
+/// Threads that load the processor.
 struct Busy {
     stop: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
@@ -178,13 +177,13 @@ impl Drop for Busy {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         for thread in self.threads.drain(..) {
-            // a thread that only loops is of no interest
+            // the result of a thread that only loops is ignored
             let _ = thread.join();
         }
     }
 }
 
-/// The settled error of the same target flown from neutral in process, degrees.
+/// The settled error of the same target in an episode within this process, degrees.
 fn settled_in_process(kind: ControllerKind, model: &GreyBox, changes: &[Change]) -> Result<f64> {
     let mut simulator = Simulator::new(&PlantOptions::default())?;
     let mut controller =
@@ -195,21 +194,21 @@ fn settled_in_process(kind: ControllerKind, model: &GreyBox, changes: &[Change])
     Ok(episode.fly(&target, |_, _| {})?.settled_deg)
 }
 
-/// The settled error, degrees: at the end of the first ten seconds on the target, as in an
-/// episode, then at the end of the flight.
+/// The settled error (degrees) at the end of the first ten seconds on the target, as in an episode, and at the end of the
+/// flight.
 fn settled(samples: &[Sample]) -> Result<[f64; 2]> {
     let first = begun(samples)?;
     let episode = samples.get(first..first + EPISODE).context("the flight was too short")?;
     Ok([episode, samples].map(error_at_end))
 }
 
-/// The first cycle on the target.
+/// Index of the first cycle in which the target is commanded.
 fn begun(samples: &[Sample]) -> Result<usize> {
     let on_target = |s: &Sample| (s.roll_target_rad.to_degrees() - ROLL_DEG).abs() < 1e-3;
     samples.iter().position(on_target).context("the target was never flown")
 }
 
-/// The largest error of roll or pitch from ten seconds after the target was given, degrees.
+/// The largest roll or pitch error from ten seconds after the target was given, degrees.
 fn worst_held(samples: &[Sample]) -> Result<f64> {
     let held = samples.get(begun(samples)? + EPISODE..).context("the flight was too short")?;
     let errors = held.iter().map(|s| {
@@ -273,8 +272,8 @@ fn options(model: &GreyBox, pace: Pace, folder: &Path) -> Result<FlightOptions> 
     })
 }
 
-/// The controller with an LQI as its fallback. In lockstep the aircraft's seconds are milliseconds of the
-/// client's, so that it may be silent for longer of them.
+/// The companion with the controller and an LQI as its fallback. In lockstep the flight time passes much faster than the
+/// client's time. The client's timeout is therefore longer.
 fn companion_with(
     kind: ControllerKind,
     model: &GreyBox,
@@ -315,7 +314,7 @@ fn simulate(
     Ok(thread::Builder::new().name("shim".into()).spawn(work)?)
 }
 
-/// Sends setpoints at 50 Hz until the simulation is over; arms and enters OFFBOARD on the way.
+/// Arms, enters OFFBOARD and sends setpoints at 50 Hz until the simulation has ended.
 fn steer(companion: SocketAddr, simulation: &Simulation) -> Result<()> {
     let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
     socket.connect(companion)?;
@@ -337,7 +336,7 @@ fn steer(companion: SocketAddr, simulation: &Simulation) -> Result<()> {
             socket.send(&if armed { client.set_mode(Mode::Offboard) } else { client.arm() })?;
         }
         let mut datagram = [0; 2048];
-        // A time-out is no news.
+        // after a time-out there are no bytes to read
         let length = socket.recv(&mut datagram).unwrap_or(0);
         client.read(&datagram[..length], |heard| {
             if let Heard::Heartbeat { armed, mode } = heard {

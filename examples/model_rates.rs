@@ -1,5 +1,5 @@
-//! Rates of a model with their exact derivatives at random points, one JSON object a line, for programs that write
-//! the model anew and want to know whether they did: `model_rates MODEL.toml COUNT`.
+//! Prints the rates of a model with their exact derivatives at random points, one JSON object per line:
+//! `model_rates MODEL.toml COUNT`. Other implementations of the model can be checked against these values.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use greylag::physics::atmosphere::STANDARD_GRAVITY;
 use greylag::physics::{Controls, State};
 use rand::RngExt;
 
-/// Variables: the eight states, then aileron, elevator (rad) and throttle.
+/// Number of variables: the eight states, then aileron and elevator (rad) and throttle.
 const VARIABLES: usize = 11;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

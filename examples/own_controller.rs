@@ -1,4 +1,4 @@
-//! A controller of one's own, flown in JSBSim beside the LQI:
+//! Defines an own controller and flies it in JSBSim, for comparison with the LQI:
 //! `cargo run --release --ignore-rust-version --no-default-features --features sitl --example own_controller`.
 
 use std::path::Path;
@@ -9,7 +9,7 @@ use greylag::model::GreyBox;
 use greylag::physics::Command;
 use greylag::sim::{Episode, Simulator};
 
-/// Proportional attitude loops with damping by the body rates; no integrator, so an error is left.
+/// Proportional attitude loops with damping by the body rates. Without an integrator a steady-state error remains.
 #[derive(Clone)]
 struct Proportional;
 
@@ -21,7 +21,7 @@ impl Controller for Proportional {
     fn reset(&mut self, _seed: u64) {}
 
     fn command(&mut self, seen: &Observation, target: &Target) -> Command {
-        // radians, and parts of full deflection; a positive elevator pitches down
+        // inputs are in rad and rad/s, outputs are fractions of full deflection; a positive elevator pitches down
         let aileron = 1.5 * (target.roll - seen.state.roll) - 0.2 * seen.state.p;
         let elevator = -2.0 * (target.pitch - seen.state.pitch) + 0.3 * seen.state.q;
         let throttle = 0.12 + 0.1 * (target.airspeed - seen.state.airspeed);

@@ -1,4 +1,5 @@
-//! Times the planners on one core, beside the processor's own peak, and counts what they allocate.
+//! Measures the computing time per tick of the controllers and counts their memory allocations. Also prints the peak
+//! performance of one processor core.
 //!
 //! ```text
 //! cargo run --release --ignore-rust-version --no-default-features --example planner_speed
@@ -23,12 +24,12 @@ use greylag::model::{GreyBox, Residual};
 use greylag::num::{Dense, stream};
 use greylag::physics::{ActuatorState, Command, State, Time};
 
-/// The system's allocator, which counts.
+/// The system's allocator with a counter of the allocations.
 struct Counting;
 
 static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
 
-// SAFETY: every call is handed on as it is
+// SAFETY: every call is passed unchanged to the system's allocator
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
@@ -44,7 +45,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Ticks timed for each controller.
+/// Number of ticks that are timed for each controller.
 const TICKS: usize = 400;
 
 fn main() -> Result<()> {
@@ -113,7 +114,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// Networks of Table VII's sizes.
+/// A policy with random networks of the sizes in Table VII.
 fn agent(model: &GreyBox) -> Result<Agent> {
     let mut rng = stream::stream(2, &[]);
     let mut network = |sizes: &[usize]| Dense::uniform(sizes, &mut rng);

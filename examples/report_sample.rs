@@ -1,4 +1,4 @@
-//! Writes the report of a made-up flight: `cargo run --example report_sample -- OUT.html`.
+//! Writes the report page of a synthetic flight: `cargo run --example report_sample -- OUT.html`.
 
 #[path = "../tests/report/report_synthetic.rs"]
 mod synthetic;

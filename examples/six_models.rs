@@ -1,10 +1,12 @@
-//! The six dynamics models of the paper by one recipe, with what they are compared to.
+//! Trains the six dynamics models of the paper and several variants on the same data, and compares them.
 //!
-//! Priors true, mild and severe, each frozen and trainable (section V-A of \[GSFM26\]); beside them the
-//! losses of PhIHP and APHYNITY, the prior moved along with the residual from where it was given (ours fits
-//! it by equation error and holds it), the paper's way (moved along, all rollouts counting alike; ours weighs
-//! them), and a residual alone. All learn from the same flights: a random round, then rounds planned through
-//! the severe trainable model, retrained each time on everything.
+//! The six models have the true, mild and severe prior, each frozen or trainable (section V-A of \[GSFM26\]). By default a
+//! trainable prior is first estimated by equation error and then held, and the rollouts are weighted. The variants use the
+//! losses of PhIHP and APHYNITY, train the given prior together with the residual, weight all rollouts equally as in the
+//! paper, or train a residual without a prior.
+//!
+//! All models are trained on the same flights: a round of random actions, then rounds flown by a planner with the severe
+//! trainable model. This model is retrained on all flights before each of these rounds.
 //!
 //! ```text
 //! cargo run --release --ignore-rust-version --example six_models -- --out target/six-models
@@ -34,28 +36,28 @@ use greylag::sim::evaluation::{Evaluation, evaluate};
 use greylag::sim::{Episode, Group, Simulator, TargetFile};
 use greylag_sitl::plant::PlantOptions;
 
-/// Learns the six models, scores them, and prints the table.
+/// Trains the six models and their variants, scores them, and prints a table.
 #[derive(Parser)]
 struct Arguments {
-    /// Folder for the models and the table as JSON.
+    /// Folder for the models and the results as JSON.
     #[arg(long)]
     out: PathBuf,
-    /// Episodes of the random round; 175 in the paper.
+    /// Number of episodes with random actions; 175 in the paper.
     #[arg(long, default_value_t = 175)]
     episodes: u32,
-    /// Planned rounds of 25 episodes; five in the paper.
+    /// Number of rounds of 25 episodes flown by a planner; five in the paper.
     #[arg(long, default_value_t = 5)]
     rounds: u32,
-    /// Updates of each training.
+    /// Number of parameter updates of each training.
     #[arg(long, default_value_t = 20_000)]
     updates: u64,
-    /// Units of the hidden layers of the residual.
+    /// Number of units in each hidden layer of the residual.
     #[arg(long, value_delimiter = ',', default_values_t = [64, 64])]
     hidden: Vec<usize>,
-    /// Models to learn, by the names of the table; all of them without it.
+    /// Names of the models to train, as in the table; all models without this option.
     #[arg(long, num_args = 1.., value_name = "NAME")]
     models: Vec<String>,
-    /// Held-out flights of each kind.
+    /// Number of held-out flights of each kind.
     #[arg(long, default_value_t = 24)]
     held_out: usize,
     /// Seed of all random draws.
@@ -68,7 +70,7 @@ impl Arguments {
         self.models.is_empty() || self.models.iter().any(|name| name == way.name)
     }
 
-    /// Names of models that there are none of.
+    /// Checks that the selected models exist.
     fn check(&self) -> Result<()> {
         let unknown = self.models.iter().find(|name| WAYS.iter().all(|way| way.name != **name));
         let names: Vec<&str> = WAYS.iter().map(|way| way.name).collect();
@@ -81,25 +83,25 @@ impl Arguments {
     }
 }
 
-/// Horizons of the free runs, steps.
+/// Numbers of steps of the open-loop simulations.
 const HORIZONS: [usize; 4] = [1, 10, 100, 500];
 
-/// Seeds of what is held out begin here.
+/// Offset of the seeds of the held-out flights.
 const HELD_OUT: u64 = 9000;
 
-/// A way to learn a model.
+/// A method of training a model.
 struct Way {
     name: &'static str,
     prior: &'static str,
     trainable: bool,
     criterion: Criterion,
-    /// Where the trained coefficients start.
+    /// Starting values of the trained coefficients.
     start: Start,
-    /// How they are learned along, if they start as given.
+    /// Method of training the coefficients together with the residual, if they start from the values of the prior.
     joint: Joint,
-    /// Whether the residual learns alone, on a prior without forces.
+    /// Whether only the residual is trained, with a prior whose coefficients are zero.
     alone: bool,
-    /// Whether all rollouts count alike, as in the papers.
+    /// Whether all rollouts have equal weight, as in the papers.
     alike: bool,
 }
 
@@ -116,7 +118,7 @@ const fn way(name: &'static str, prior: &'static str, trainable: bool) -> Way {
     }
 }
 
-/// Trained along with the residual from the severe prior as given.
+/// A method that trains the severe prior together with the residual, from the given values of the prior.
 const fn along(name: &'static str, joint: Joint, alike: bool) -> Way {
     Way { start: Start::AsGiven, joint, alike, ..way(name, "prior-severe", true) }
 }
@@ -149,15 +151,16 @@ const WAYS: [Way; 16] = [
 #[derive(Serialize)]
 struct Row {
     model: &'static str,
-    /// ‖F_a‖/‖F_p‖ over the held-out flights.
+    /// Ratio ‖F_a‖/‖F_p‖ of the residual's contribution to the prior's, over the held-out flights.
     ratio: f64,
-    /// Median relative error of the trained coefficients, before and after; of those that were wrong.
+    /// Median relative error of the trained coefficients before and after training.
     coefficients: Option<[f64; 2]>,
     learned: Vec<Learned>,
-    /// Free runs of the prior and of the model: easy, hard, random actions with stalls.
+    /// Errors of open-loop simulations with the prior on easy flights, hard flights and flights with random actions.
+    /// `model_runs` has those with the model.
     prior: [Vec<Horizon>; 3],
     model_runs: [Vec<Horizon>; 3],
-    /// Settled error in degrees (easy, hard corners) and divergence rate of an LQI designed on it.
+    /// Settled error (easy targets and hard corners, degrees) and divergence rate of an LQI designed from the model.
     lqi: Option<[f64; 3]>,
     training_s: f64,
 }
@@ -169,7 +172,7 @@ fn main() -> Result<()> {
     let load = |name: &str| -> Result<(PathBuf, GreyBox)> {
         let path = params.join(format!("x8/{name}.toml"));
         let mut model = GreyBox::load(&path)?;
-        // the flights are the simulator's, and so is the scheme
+        // the integration scheme is that of the simulator in which the flights are flown
         model.integrator = Integrator::Jsbsim;
         Ok((path, model))
     };
@@ -234,7 +237,7 @@ fn main() -> Result<()> {
         .with_context(|| format!("cannot write {}", json.display()))
 }
 
-/// How far each model is off after 100 steps, over how far the first is.
+/// Prints the error of each model after 100 steps as a multiple of the first model's error.
 fn beside(rows: &[Row]) {
     let off = |row: &Row| row.model_runs.each_ref().map(|runs| runs[2].rms);
     let Some(first) = rows.first() else { return };
@@ -247,8 +250,8 @@ fn beside(rows: &[Row]) {
     }
 }
 
-/// Flights towards fresh targets, easy and hard, flown by an LQI on `reference`; and as many under random
-/// actions, which stall.
+/// Held-out flights: to new easy targets and to new hard targets, both flown by an LQI designed from `reference`, and the same
+/// number of flights with random actions, which include stalls.
 fn held_out(arguments: &Arguments, reference: &GreyBox) -> Result<[Vec<Flight>; 3]> {
     let targets = TargetFile::generate(HELD_OUT + arguments.seed);
     let mut controller = Lqi::new(reference)?;
@@ -281,7 +284,8 @@ fn held_out(arguments: &Arguments, reference: &GreyBox) -> Result<[Vec<Flight>; 
     Ok([easy, hard, stalled?])
 }
 
-/// The exploration: a random round, then rounds planned through a model that learns from all before.
+/// Flights for training: a round of random actions, then rounds flown by a planner. Its model is trained on all earlier
+/// rounds.
 fn explored(arguments: &Arguments, prior: &GreyBox) -> Result<Vec<Flight>> {
     let mut flights = round(arguments, 0, arguments.episodes, None)?;
     for k in 1..=arguments.rounds {
@@ -355,8 +359,8 @@ fn trained(
     Ok(trainer)
 }
 
-/// What a trainable prior learns: what mild and severe have wrong; Jxz and the thrust for the one as
-/// printed.
+/// Names of the coefficients that are trained: those with errors in the severe prior, or Jxz and the thrust for the prior as
+/// printed in the paper.
 fn perturbed(way: &Way, prior: &GreyBox) -> Result<Vec<String>> {
     if way.prior == "prior-as-printed" {
         return Ok(vec![JXZ.into(), "thrust_linear.Cp_n".into()]);
@@ -382,8 +386,8 @@ fn errors(learned: &[Learned]) -> Option<[f64; 2]> {
     Some([median(&|l| l.start)?, median(&|l| l.value)?])
 }
 
-/// Settled errors of an LQI designed on `model`: easy, hard corners, share lost; `None` if it has no
-/// design.
+/// Mean settled errors (degrees) of an LQI designed from `model` on easy targets and hard corners, and its divergence rate.
+/// `None` if no LQI can be designed.
 fn steered(model: &GreyBox, targets: &Path) -> Result<Option<[f64; 3]>> {
     let Ok(lqi) = Lqi::new(model) else { return Ok(None) };
     let mut targets = TargetFile::load(targets)?;
@@ -426,7 +430,7 @@ fn table(rows: &[Row]) -> Table {
             format!("{:.0} -> {:.1} %", 100.0 * before, 100.0 * after)
         }));
         for (prior, model) in row.prior.iter().zip(&row.model_runs) {
-            // the model's root mean square error over the bare prior's
+            // ratio of the model's rms error to that of the prior without a residual
             cells.extend(prior.iter().zip(model).map(|(p, m)| format!("{:.4}", m.rms / p.rms)));
         }
         match row.lqi {

@@ -1,4 +1,4 @@
-"""Maturin, which is told here that the crate jsbsim builds with an older Rust than it declares."""
+"""The build backend maturin with ``--ignore-rust-version``: the crate jsbsim builds with an older Rust than it declares."""
 
 import os
 

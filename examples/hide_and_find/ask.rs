@@ -1,4 +1,4 @@
-//! The question of a case, put to the diagnosis.
+//! Runs the diagnosis on a test case and records its answer.
 
 use std::collections::BTreeMap;
 
@@ -10,17 +10,18 @@ use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use crate::cases::Case;
 use crate::record::Record;
 
-/// Candidates that are kept of a diagnosis.
+/// Number of candidates of a diagnosis that are recorded.
 const KEPT: usize = 10;
 
 /// Answer of the diagnosis.
 pub struct Answer {
     said: Diagnosis,
-    /// Values of the asserted effects' coefficients, in their own order.
+    /// Coefficients of each asserted effect by the effect's id, in the order of the catalogue.
     pub values: BTreeMap<String, Vec<f64>>,
 }
 
-/// Asks what `model` lacks on the flights of `case`, with so many simulated nulls or as many as usual.
+/// Diagnoses which effects `model` lacks in the flights of `case`. `nulls` is the number of surrogate data sets without an
+/// effect; `None` uses the default number.
 pub fn ask(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -43,7 +44,7 @@ pub fn ask(
 }
 
 impl Answer {
-    /// Notes what is kept.
+    /// Writes the answer into `record`.
     pub fn write_into(&self, record: &mut Record) {
         let effects = &self.said.effects;
         let id = |c: &Candidate| c.id.clone();
@@ -66,7 +67,7 @@ impl Answer {
     }
 }
 
-/// Errors of installation and calibration that are asserted; of delays those beyond two samples.
+/// Ids of the asserted installation and calibration errors. Delays are included if they exceed two samples.
 fn seldom(said: &Diagnosis) -> Vec<String> {
     const LATE_S: f64 = 0.02;
     const IDS: [&str; 5] =
@@ -81,20 +82,20 @@ fn seldom(said: &Diagnosis) -> Vec<String> {
     ids
 }
 
-/// Amplitude as a multiple of the minimum detectable one by the diagnosis, the smaller one of a
-/// pair; as requested where the diagnosis has none.
+/// Amplitude as a multiple of the minimum detectable amplitude of the diagnosis. For a pair of effects it is the smaller
+/// multiple. If the diagnosis has no minimum detectable amplitude, it is the recorded multiple.
 fn reached(record: &Record) -> f64 {
     let truth = record.truth.iter().zip(&record.amplitudes);
     let multiples = truth.filter_map(|(id, amplitude)| {
         let multiple = amplitude.abs() / record.minimum_detectable.get(id)?;
-        // a slower rate is more of it
+        // a smaller rate limit is a stronger effect
         Some(if id == "rate_limit" { multiple.recip() } else { multiple })
     });
     let known = multiples.filter(|m| m.is_finite()).fold(f64::INFINITY, f64::min);
     if known.is_finite() { known } else { record.reached }
 }
 
-/// Standard deviation of the coefficient that is hidden as a multiple of that of the first one.
+/// Ratio of the standard deviation of the hidden coefficient to that of the effect's first coefficient.
 fn hidden(c: &Candidate) -> f64 {
     let place = if c.id == "drag_beta2" { 1 } else { 0 };
     let width = |k: usize| c.parameters.get(k).map_or(f64::NAN, |p| p.ci95[1] - p.ci95[0]);

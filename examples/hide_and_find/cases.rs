@@ -1,4 +1,5 @@
-//! The cases of the campaign: what is hidden, how much of it, and what the catalogue is robbed of.
+//! The test cases of the campaign. A case defines the hidden effects, their amplitudes, and the effects that are removed from
+//! the catalogue.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -11,26 +12,28 @@ use rand::RngExt;
 
 use crate::record::Record;
 
-/// Amplitudes as multiples of the minimum detectable one.
+/// Amplitudes of single effects, as multiples of the minimum detectable amplitude.
 pub const FACTORS: [f64; 3] = [1.0, 2.0, 5.0];
-/// Amplitude of both effects of a pair, and of one that the catalogue lacks, likewise.
+/// Amplitude of the effects of a pair and of an effect that the catalogue lacks, as a multiple of the minimum detectable
+/// amplitude.
 const CLEAR: f64 = 5.0;
-/// Share of the largest clear amplitude that is taken for the minimum detectable one as long as no
-/// null has shown it.
+/// Minimum detectable amplitude that is assumed if no flight without hidden effects has given it, as a fraction of the largest
+/// amplitude in `MissingKind::clear`.
 const ASSUMED: f64 = 0.1;
 
-/// One case.
+/// A test case.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// `nulls`, `installed`, `probes`, `effects`, `without` or `pairs`.
+    /// Part of the campaign: `nulls`, `installed`, `probes`, `effects`, `without` or `pairs`.
     pub part: &'static str,
     /// Effects that the model lacks.
     pub missing: Vec<Missing>,
-    /// Amplitude as a multiple of the minimum detectable one, as wanted; 0 for nulls.
+    /// Requested amplitude as a multiple of the minimum detectable amplitude; 0 if no effect is hidden.
     pub factor: f64,
-    /// The same as it is: what cannot be flown is made smaller, and a delay is a whole number of steps.
+    /// The same multiple for the amplitude that is used. An amplitude that cannot be flown is reduced, and a delay is rounded
+    /// to a whole number of steps.
     pub reached: f64,
-    /// Ids that the catalogue is robbed of.
+    /// Ids of the effects that are removed from the catalogue.
     pub without: Vec<String>,
     /// Seed of all random draws of the case.
     pub seed: u64,
@@ -43,23 +46,23 @@ impl Case {
         format!("{}/{}/x{}/{}", self.part, ids.join("+"), self.factor, self.seed)
     }
 
-    /// How the instruments are installed, with the name of what is wrong with them; `None` if nothing is.
+    /// The installation of the instruments with the name of its error; `None` if it has no error.
     pub fn installed(&self) -> Option<(&'static str, Installation)> {
         (self.part == "installed").then(|| Installation::one(self.seed))
     }
 
-    /// The ids that are to be found.
+    /// Ids of the effects that the diagnosis should find.
     pub fn truth(&self) -> Vec<String> {
         let acts = |m: &&Missing| m.amplitude != 0.0;
         self.missing.iter().filter(acts).map(|m| m.id.to_owned()).collect()
     }
 }
 
-/// The aircraft, with the minimum detectable amplitude of each effect: the median over nulls and probes.
+/// The minimum detectable amplitude of each effect, as the median over nulls and probes, and the aircraft's scale factors.
 pub struct Seen(BTreeMap<String, f64>, Craft);
 
 impl Seen {
-    /// Median minimum detectable amplitudes of the nulls and probes among `records`.
+    /// Median minimum detectable amplitudes over the nulls and probes among `records`.
     pub fn of(records: &[Record], craft: &Craft) -> Seen {
         let mut all: BTreeMap<String, Vec<f64>> = BTreeMap::new();
         for record in records.iter().filter(|r| r.part == "nulls" || r.part == "probes") {
@@ -73,16 +76,16 @@ impl Seen {
         )
     }
 
-    /// The amplitude of `factor` times the minimum detectable one, as far as it can be flown, and what
-    /// multiple that is; its sign drawn where it may have either.
+    /// An amplitude of `factor` times the minimum detectable amplitude, limited to what can be flown, and the multiple that it
+    /// has. The sign is random if the effect can have either sign.
     fn amplitude(&self, kind: &MissingKind, factor: f64, seed: u64) -> (f64, f64) {
         let [low, high] = kind.clear;
         let (largest, sign) = (low.abs().max(high.abs()), (low + high).signum());
         let least = self.0.get(kind.id).copied().filter(|x| x.is_finite() && *x > 0.0);
         let (size, least) = match kind.id {
-            // it cannot be hidden in part
+            // these effects have no amplitude
             "lift_stall" | "rudder_linear" | "propeller" => return (1.0, factor),
-            // a slower rate is more of it
+            // a smaller rate limit is a stronger effect
             "rate_limit" => {
                 let least = least.unwrap_or(largest / ASSUMED.sqrt());
                 ((least / factor).max(kind.most()), least)
@@ -98,15 +101,15 @@ impl Seen {
         (amplitude, if kind.id == "rate_limit" { multiple.recip() } else { multiple })
     }
 
-    /// The effect with the multiple of its minimum detectable amplitude that it has.
+    /// The effect with the amplitude of `Seen::amplitude`, and its multiple of the minimum detectable amplitude.
     fn missing(&self, kind: &MissingKind, factor: f64, seed: u64) -> Option<(Missing, f64)> {
         let (amplitude, reached) = self.amplitude(kind, factor, seed);
         Some((Missing::new(&self.1, kind.id, amplitude).ok()?, reached))
     }
 }
 
-/// Flights on which nothing is missing. In every other one aircraft and model both lack an effect that the
-/// aircraft has of its own, so that it is a candidate in some.
+/// Cases in which no effect is missing from the model. In cases with an odd seed, an effect of the aircraft is removed from
+/// both the aircraft and the model. It is then a candidate of the diagnosis.
 pub fn nulls(craft: &Craft, seeds: Range<u64>) -> Vec<Case> {
     let absent = |id: &str| Missing::new(craft, id, 0.0).ok();
     seeds
@@ -117,13 +120,13 @@ pub fn nulls(craft: &Craft, seeds: Range<u64>) -> Vec<Case> {
         .collect()
 }
 
-/// Flights on which nothing of the aircraft is missing, and one instrument is installed or calibrated wrong.
+/// Cases in which no effect is missing from the model, and one instrument is installed or calibrated wrongly.
 pub fn installed(seeds: Range<u64>) -> Vec<Case> {
     seeds.map(|seed| nothing("installed", seed, None)).collect()
 }
 
-/// Flights that show how much of `drag_beta2` is detectable. They are no nulls: the part of it that
-/// goes with |β| cannot be taken from the aircraft.
+/// Cases that show the minimum detectable amplitude of `drag_beta2`. They are not free of missing effects: the part of the
+/// effect that is proportional to |β| cannot be removed from the aircraft.
 pub fn probes(craft: &Craft, seeds: Range<u64>) -> Vec<Case> {
     let absent = || Missing::new(craft, "drag_beta2", 0.0).ok();
     seeds.map(|seed| nothing("probes", seed, absent())).collect()
@@ -134,7 +137,7 @@ fn nothing(part: &'static str, seed: u64, absent: Option<Missing>) -> Case {
     Case { part, missing, factor: 0.0, reached: 0.0, without: Vec::new(), seed }
 }
 
-/// Each effect at each of the amplitudes `factors`.
+/// One case for each effect and each of the amplitudes `factors`. `wanted` selects the effects by id.
 pub fn effects(
     seeds: Range<u64>,
     factors: &[f64],
@@ -146,7 +149,7 @@ pub fn effects(
     let mut all = Vec::new();
     for seed in seeds {
         for kind in seen.1.kinds().iter().filter(|kind| wanted(kind.id)) {
-            // the largest first, so that what cannot be larger counts once, under the largest factor
+            // the largest factor comes first; amplitudes that are limited to the same value are then used only once
             let mut flown: Vec<f64> = Vec::new();
             for &factor in &factors {
                 let Some((missing, reached)) = seen.missing(kind, factor, seed) else { continue };
@@ -163,13 +166,13 @@ pub fn effects(
     all
 }
 
-/// Each effect, clear to see, with a catalogue that does not have it.
+/// One case for each effect at a clear amplitude, with this effect removed from the catalogue.
 pub fn without(seeds: Range<u64>, seen: &Seen, wanted: impl Fn(&str) -> bool) -> Vec<Case> {
     let robbed = |case: Case| Case { part: "without", without: case.truth(), ..case };
     effects(seeds, &[CLEAR], seen, wanted).into_iter().map(robbed).collect()
 }
 
-/// Pairs of effects, as many a seed as there are effects, each with another drawn from the seed.
+/// For each seed, one case for each effect paired with another effect. The pairing is drawn from the seed.
 pub fn pairs(seeds: Range<u64>, seen: &Seen, wanted: impl Fn(&str) -> bool) -> Vec<Case> {
     let mut all = Vec::new();
     for seed in seeds {

@@ -1,4 +1,4 @@
-//! The regression behind a case as CSV, for other methods to try their hand at the same signals.
+//! Writes the regression of a test case as CSV. Other methods can then be tested on the same signals.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -17,15 +17,16 @@ use crate::search::Flown;
 /// Channels of the regression: D, L, Y, l, m, n.
 const CHANNELS: usize = 6;
 
-/// A column over all windows of all flights, channel after channel within a flight.
+/// A column of the regression over all windows of all flights. Within a flight the channels follow each other.
 struct Column {
     name: String,
     values: Vec<f64>,
 }
 
-/// Writes `KEY.csv`: a row a window and channel, scaled by the channel's noise. `y` is measured less
-/// predicted by the starting model; `prior:…` are the columns of its coefficients times their prior
-/// widths, `bias:…` constants, `candidate:ID:k` what the effects of the catalogue would add.
+/// Writes `KEY.csv` with one row for each window and channel, divided by the standard deviation of the channel's noise. The
+/// column `y` is the measured value minus the prediction of the starting model. The columns `prior:…` belong to the model's
+/// coefficients and are multiplied by their prior standard deviations. The columns `bias:…` are constants. The columns
+/// `candidate:ID:k` are the contributions of the catalogue's effects.
 pub fn write(folder: &Path, case: &Case, flown: &Flown) -> Result<()> {
     let flights: Vec<Prepared> =
         flown.training.iter().map(|f| Prepared::new(f, 5.0)).collect::<Result<_, _>>()?;
@@ -38,7 +39,7 @@ pub fn write(folder: &Path, case: &Case, flown: &Flown) -> Result<()> {
     let mut all = prior(model, &flights, &scales);
     for id in candidates(model, &case.without) {
         let suspect = Suspect { id: id.into(), values: Vec::new() };
-        // an effect of which nobody knows how large it may be is no candidate here
+        // an effect without known plausible values is omitted
         let Ok(ways) = alternatives(model, &suspect) else { continue };
         for (k, with) in ways.iter().flatten().enumerate() {
             let values = lacks.iter().zip(gaps(with)).map(|(a, b)| a - b).collect();
@@ -51,7 +52,7 @@ pub fn write(folder: &Path, case: &Case, flown: &Flown) -> Result<()> {
         .with_context(|| format!("writing {}", path.display()))
 }
 
-/// Effects of the catalogue that the model lacks.
+/// Ids of the catalogue's effects that the model lacks, except those in `without`.
 fn candidates<'a>(
     model: &'a GreyBox,
     without: &'a [String],
@@ -71,7 +72,7 @@ fn noise(series: &[Series]) -> [f64; CHANNELS] {
     scale
 }
 
-/// Measured less predicted in units of noise.
+/// Measured minus predicted values, divided by the standard deviation of the noise.
 fn scaled(series: &[Series], scale: &[f64; CHANNELS]) -> Vec<f64> {
     let own = series.iter().filter(|s| (s.channel as usize) < CHANNELS);
     own.flat_map(|s| {
@@ -82,7 +83,7 @@ fn scaled(series: &[Series], scale: &[f64; CHANNELS]) -> Vec<f64> {
     .collect()
 }
 
-/// The columns of the model's own coefficients and of constant sensor errors.
+/// The columns of the model's own coefficients, and a constant for each channel.
 fn prior(model: &GreyBox, flights: &[Prepared], scales: &[[f64; CHANNELS]]) -> Vec<Column> {
     let linear = model.linear();
     let found: Vec<_> = flights.iter().map(|f| columns(model, f)).collect();

@@ -1,15 +1,16 @@
-//! Hide and find: the benchmark of the search for missing effects, as a table.
+//! Benchmark of the diagnosis of missing effects, with the results as a table.
 //!
-//! Every case hides effects inside JSBSim, flies, spoils the logs as real sensors do, and asks the
-//! program what is missing from a model whose coefficients are wrong by 15 %. A line of JSON a case is
-//! appended to the results, so that a campaign can be interrupted and taken up again:
+//! Every test case hides effects inside JSBSim, flies, and adds sensor errors to the logs. The program then diagnoses which
+//! effects are missing from a model whose coefficients have errors of 15 %. Each case appends one line of JSON to the
+//! results. A campaign can therefore be interrupted and resumed:
 //!
 //! ```text
 //! cargo run --release --ignore-rust-version --no-default-features --features sitl \
 //!     --example hide_and_find -- --results target/hide-and-find.jsonl
 //! ```
 //!
-//! Nulls come first: how much of each effect could have been seen is the median over them.
+//! The cases without hidden effects (nulls) come first. The minimum detectable amplitude of each effect is the median over
+//! them.
 
 mod ask;
 mod cases;
@@ -34,10 +35,10 @@ use greylag::sim::missing::Craft;
 use record::Record;
 use search::Bench;
 
-/// Flights that are flown to see how much of an effect could be seen.
+/// Number of cases that determine the minimum detectable amplitude of `drag_beta2`.
 const PROBES: u64 = 8;
 
-/// Hides effects in JSBSim, looks for them, and prints the table.
+/// Hides effects in JSBSim, diagnoses them, and prints a table of the results.
 #[derive(Parser)]
 struct Arguments {
     /// Part of the campaign to run.
@@ -46,37 +47,37 @@ struct Arguments {
     /// Seeds of the cases, as FIRST..LAST (the last one not included).
     #[arg(long, value_parser = seeds, default_value = "1000..1005")]
     seeds: (u64, u64),
-    /// Number of null flights.
+    /// Number of cases without a hidden effect (nulls).
     #[arg(long, default_value_t = 100)]
     nulls: u64,
-    /// Seed of the first null flight and of the first probe flight.
+    /// Seed of the first null and of the first probe.
     #[arg(long, default_value_t = 0)]
     null_seed: u64,
-    /// Amplitudes of single effects, as multiples of the minimum detectable one.
+    /// Amplitudes of single effects, as multiples of the minimum detectable amplitude.
     #[arg(long, num_args = 1.., default_values_t = cases::FACTORS)]
     factors: Vec<f64>,
-    /// Nulls that each diagnosis simulates, in place of the usual number.
+    /// Number of surrogate data sets without an effect in each diagnosis, instead of the default.
     #[arg(long)]
     simulated_nulls: Option<usize>,
-    /// Model that flies as the simulator's aircraft does.
+    /// Model file that matches the simulator's aircraft.
     #[arg(long, default_value = "params/x8/jsbsim.toml")]
     model: PathBuf,
-    /// The simulator's aircraft, built in.
+    /// Name of the simulator's built-in aircraft.
     #[arg(long, default_value = "x8")]
     aircraft: String,
-    /// Only these effects, by their ids.
+    /// Ids of the effects to hide; all effects without this option.
     #[arg(long, num_args = 1..)]
     effects: Vec<String>,
-    /// One line of JSON a case; cases that are in it are not done again.
+    /// File with the results, one line of JSON per case. Cases in this file are not repeated.
     #[arg(long, default_value = "target/hide-and-find.jsonl")]
     results: PathBuf,
-    /// Only print the table of what is in the results.
+    /// Only print the table of the results in the file.
     #[arg(long)]
     table: bool,
-    /// Also write each case's regression (CSV) for other methods, into this folder.
+    /// Also write the regression of each case as CSV into this folder, for other methods.
     #[arg(long)]
     export: Option<PathBuf>,
-    /// Write the regressions and search nothing.
+    /// Only write the regressions, without a diagnosis.
     #[arg(long, requires = "export")]
     export_only: bool,
 }
@@ -84,7 +85,7 @@ struct Arguments {
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Part {
     Nulls,
-    /// Nulls whose instruments are installed or calibrated wrong.
+    /// Cases without a hidden effect, with one instrument installed or calibrated wrongly.
     Installed,
     Probes,
     Effects,
@@ -112,7 +113,7 @@ fn main() -> Result<()> {
     }
     if !arguments.table {
         let bench = Bench::new(&arguments.model, &arguments.aircraft, arguments.simulated_nulls)?;
-        // amplitudes of the other parts hang on what the nulls could have seen
+        // the amplitudes of the second group depend on the minimum detectable amplitudes of the first
         for parts in [
             [Part::Nulls, Part::Installed, Part::Probes].as_slice(),
             &[Part::Effects, Part::Without, Part::Pairs],
@@ -129,9 +130,9 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The cases of a part of the campaign, if it is asked for.
+/// The cases of a part of the campaign; none if the arguments do not select this part.
 fn list(arguments: &Arguments, part: Part, seen: &Seen, craft: &Craft) -> Vec<Case> {
-    // probes go with nulls
+    // probes are run whenever nulls are
     let asked = if part == Part::Probes { Part::Nulls } else { part };
     if arguments.part != asked && arguments.part != Part::All {
         return Vec::new();
@@ -140,7 +141,7 @@ fn list(arguments: &Arguments, part: Part, seen: &Seen, craft: &Craft) -> Vec<Ca
         |id: &str| arguments.effects.is_empty() || arguments.effects.iter().any(|e| e == id);
     let (seeds, first) = (arguments.seeds.0..arguments.seeds.1, arguments.null_seed);
     match part {
-        // the nulls' seeds are apart from all others
+        // the seeds of nulls differ from those of all other parts
         Part::Nulls => cases::nulls(craft, first..first + arguments.nulls),
         Part::Installed => cases::installed(first..first + arguments.nulls),
         Part::Probes => cases::probes(craft, first..first + PROBES),
@@ -151,7 +152,7 @@ fn list(arguments: &Arguments, part: Part, seen: &Seen, craft: &Craft) -> Vec<Ca
     }
 }
 
-/// Does `cases` on all cores, appending each result as it comes.
+/// Runs `cases` on all cores and appends each result to the results file when it is ready.
 fn run(arguments: &Arguments, bench: &Bench, cases: &[Case]) -> Result<()> {
     if cases.is_empty() {
         return Ok(());

@@ -1,4 +1,4 @@
-//! Record of a case: one line of JSON.
+//! The result of a test case, stored as one line of JSON.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::cases::Case;
 
-/// A parameter of an asserted true effect, after the fit.
+/// A fitted coefficient of an asserted effect that is truly missing.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct Found {
-    /// Full name `effect.coefficient` of the parameter.
+    /// Full name `effect.coefficient`.
     pub name: String,
     /// Value that was hidden.
     pub truth: f64,
@@ -21,18 +21,18 @@ pub struct Found {
     pub ci95: [f64; 2],
 }
 
-/// Free-run errors over 5 s on held-out flights, scaled by x_c.
+/// Errors of open-loop simulations over 5 s on held-out flights, divided by the state's scale x_c.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize)]
 pub struct HeldOut {
-    /// Error of the tuned prior.
+    /// Error of the starting model with re-estimated coefficients.
     pub tuned: f64,
-    /// With what was asserted.
+    /// Error after the asserted effects were added and fitted.
     pub amended: f64,
-    /// With what is true, fitted in the same way.
+    /// Error after the true effects were added and fitted in the same way.
     pub oracle: f64,
 }
 
-/// Seconds that the steps of a case took.
+/// Computing time of the steps of a case, s.
 #[derive(Clone, Copy, Debug, Default, Deserialize, Serialize)]
 pub struct Seconds {
     /// Time of flying, logging and reconstructing.
@@ -43,63 +43,64 @@ pub struct Seconds {
     pub amend: f64,
 }
 
-/// A case with what came of it.
+/// A test case with its result.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
 pub struct Record {
     /// Name of the case.
     pub key: String,
-    /// `nulls`, `probes`, `effects`, `without` or `pairs`.
+    /// Part of the campaign: `nulls`, `installed`, `probes`, `effects`, `without` or `pairs`.
     pub part: String,
     /// Ids of the effects that the model lacked.
     pub truth: Vec<String>,
-    /// How much of it.
+    /// Amplitudes of these effects.
     pub amplitudes: Vec<f64>,
-    /// Amplitude as a multiple of the median minimum detectable one of the nulls, as requested.
+    /// Requested amplitude as a multiple of the median minimum detectable amplitude of the nulls.
     pub factor: f64,
-    /// And as a multiple of what the case's own flights would have shown; of a pair, the smaller one.
+    /// Amplitude as a multiple of the minimum detectable amplitude in the case's own flights. For a pair it is the smaller
+    /// multiple.
     pub reached: f64,
-    /// Why there is no answer, if there is none.
+    /// Reason why there is no diagnosis; `None` if there is one.
     pub failure: Option<String>,
-    /// The answer in one word.
+    /// Verdict of the diagnosis in one word.
     pub verdict: String,
-    /// Candidates as the diagnosis lists them.
+    /// Ids of the best candidates in the order of the diagnosis.
     pub ranked: Vec<String>,
-    /// Those that it asserts.
+    /// Ids of the effects that the diagnosis asserts.
     pub asserted: Vec<String>,
-    /// Error of the instruments' installation, if there is one.
+    /// Name of the installation error of the instruments; `None` without such an error.
     #[serde(default)]
     pub installed: Option<String>,
-    /// Errors of the instruments that the diagnosis asserts, beyond biases, wind and clocks within a sample.
+    /// Ids of the asserted instrument errors. Biases, wind and short delays are excluded.
     #[serde(default)]
     pub instruments: Vec<String>,
-    /// For each of those, and for the first, what cannot be distinguished from it.
+    /// For the first candidate and each asserted effect: the effects that cannot be distinguished from it.
     pub alike: BTreeMap<String, Vec<String>>,
-    /// Why the first is not asserted; empty if it is.
+    /// Reasons why the first candidate is not asserted; empty if it is asserted.
     #[serde(default)]
     pub refused: Vec<String>,
-    /// Why an effect that was examined is not asserted.
+    /// Reasons why an examined effect is not asserted, by its id.
     #[serde(default)]
     pub refusals: BTreeMap<String, Vec<String>>,
-    /// First coefficient of the first candidate as each flight has it, with standard deviation.
+    /// First coefficient of the first candidate as estimated from each flight alone, with its standard deviation.
     #[serde(default)]
     pub by_flight: Vec<[f64; 2]>,
-    /// Evidence and threshold of the first ten.
+    /// Evidence and threshold of each candidate in `ranked`.
     pub evidence: Vec<[f64; 2]>,
-    /// Smallest amplitude of each candidate that would have shown.
+    /// Minimum detectable amplitude of each candidate.
     pub minimum_detectable: BTreeMap<String, f64>,
-    /// Parameters of true effects that were asserted.
+    /// Fitted coefficients of the true effects that were asserted.
     pub parameters: Vec<Found>,
     /// Effects that could not be fitted, with the reason.
     #[serde(default)]
     pub unfitted: Vec<String>,
-    /// Errors on held-out flights; none if the truth could not be fitted.
+    /// Errors on held-out flights; `None` if the true effects could not be fitted.
     pub held_out: Option<HeldOut>,
-    /// How long it took.
+    /// Computing times of the case.
     pub seconds: Seconds,
 }
 
 impl Record {
-    /// A record with what is known before the search.
+    /// A record of a case before its diagnosis.
     pub fn of(case: &Case) -> Record {
         Record {
             key: case.key(),
@@ -113,12 +114,12 @@ impl Record {
         }
     }
 
-    /// A case that could not be flown or read.
+    /// The record of a case that could not be flown or read.
     pub fn failed(case: &Case, why: &anyhow::Error) -> Record {
         Record { failure: Some(format!("{why:#}")), ..Record::of(case) }
     }
 
-    /// Whether `id` is asserted, itself or by one that cannot be distinguished from it.
+    /// Whether `id` or an effect that cannot be distinguished from it is asserted.
     pub fn names(&self, id: &str) -> bool {
         self.asserted.iter().any(|a| a == id || self.is_alike(a, id))
     }
@@ -129,7 +130,7 @@ impl Record {
     }
 }
 
-/// The records in a file; none if there is no file yet. A last line that was cut short is left out.
+/// Reads the records of a file. A file that does not exist has no records. An incomplete last line is omitted.
 pub fn load(path: &Path) -> Result<Vec<Record>> {
     if !path.exists() {
         return Ok(Vec::new());

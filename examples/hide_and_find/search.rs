@@ -1,4 +1,4 @@
-//! One case from the hidden effect to the error on flights that the fit never saw.
+//! Runs one test case: flies with the hidden effect, diagnoses and fits the model, and computes errors on held-out flights.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -24,39 +24,39 @@ use crate::cases::Case;
 use crate::held_out;
 use crate::record::{Found, HeldOut, Record, Seconds};
 
-/// Slower than this is not flight, m/s.
+/// Smallest airspeed of the samples that are used, m/s.
 const SLOWEST: f64 = 5.0;
 
-/// Values of effects' coefficients by the effects' ids.
+/// Values of the coefficients of effects, by the id of the effect.
 type Starts = BTreeMap<String, Vec<f64>>;
 
 /// State shared by all cases.
 pub struct Bench {
-    /// The model that flies as the simulator does: its file with its text.
+    /// File of the model that matches the simulator. `reference` is its text.
     path: PathBuf,
     reference: String,
     craft: Craft,
     subject: Subject,
     controller: Box<dyn Controller>,
-    /// Number of simulated nulls of each diagnosis; `None` is the usual number.
+    /// Number of surrogate data sets without an effect in each diagnosis; `None` for the default number.
     nulls: Option<usize>,
 }
 
 /// The flights of a case.
 pub struct Flown {
-    /// The model to start from.
+    /// The starting model of the diagnosis.
     pub model: GreyBox,
-    /// Flights to fit on.
+    /// Flights for the diagnosis and the fits.
     pub training: Vec<Reconstruction>,
-    /// Flights to test on.
+    /// Held-out flights.
     pub testing: Vec<Reconstruction>,
-    /// How long flying, logging and reconstructing took, s.
+    /// Computing time of flying, logging and reconstructing, s.
     seconds: f64,
 }
 
 impl Bench {
-    /// Designs the controller that flies all cases with the simulator's `aircraft`, of which the file at `path` is the
-    /// model; every diagnosis simulates so many `nulls`.
+    /// Designs the controller that flies all cases with the simulator's `aircraft`. The model file at `path` matches this
+    /// aircraft. `nulls` is the number of surrogate data sets in each diagnosis.
     pub fn new(path: &Path, aircraft: &str, nulls: Option<usize>) -> Result<Bench> {
         let model = GreyBox::load(path)?;
         let plant = PlantOptions { aircraft: aircraft.to_owned(), ..PlantOptions::default() };
@@ -70,12 +70,12 @@ impl Bench {
         })
     }
 
-    /// The sizes of the aircraft.
+    /// The factors that scale amplitudes to the aircraft.
     pub fn craft(&self) -> &Craft {
         &self.craft
     }
 
-    /// Flies a case and reconstructs its logs; test flights are left out of nulls.
+    /// Flies a case and reconstructs its logs. The test flights are omitted if no effect is hidden.
     pub fn fly(&self, case: &Case) -> Result<Flown> {
         let begun = Instant::now();
         let Case { seed, missing, .. } = case;
@@ -96,7 +96,7 @@ impl Bench {
         Ok(Flown { model, training, testing, seconds: begun.elapsed().as_secs_f64() })
     }
 
-    /// Diagnoses a flown case, amends the model, and judges it.
+    /// Diagnoses a flown case, fits the model with the asserted effects, and computes errors on held-out flights.
     pub fn search(&self, case: &Case, flown: &Flown) -> Record {
         let mut record = Record::of(case);
         record.seconds.flights = flown.seconds;
@@ -130,7 +130,8 @@ fn fill(record: &mut Record, case: &Case, flown: &Flown, bench: &Bench) -> Resul
     Ok(())
 }
 
-/// The fits of the tuned prior, of what was asserted and of what is true, on flights unseen.
+/// Fits the starting model without further effects, with the asserted effects and with the true effects. Records the errors
+/// of these fits on held-out flights.
 fn judge(record: &mut Record, case: &Case, flown: &Flown, answer: &Answer) -> Result<()> {
     let flights: Vec<amend::Flight> = flown
         .training
@@ -144,7 +145,7 @@ fn judge(record: &mut Record, case: &Case, flown: &Flown, answer: &Answer) -> Re
         .collect::<Result<_, _>>()?;
     let mut fits: BTreeMap<Vec<String>, Fit> = BTreeMap::new();
     let truth = case.truth();
-    // from where the diagnosis has it; what it has not found, from the truth
+    // fits start from the values of the diagnosis; effects that it did not find start from their true values
     let hidden = case.missing.iter().filter(|m| !m.values.is_empty());
     let mut starts: Starts = hidden.map(|m| (m.id.to_owned(), m.values.clone())).collect();
     starts.extend(answer.values.clone());
@@ -156,12 +157,12 @@ fn judge(record: &mut Record, case: &Case, flown: &Flown, answer: &Answer) -> Re
             }
         }
     }
-    // an effect that cannot be fitted stays out of the model, as `amend` leaves it out
+    // if the effects cannot be fitted, the model without them is used, as in `greylag amend`
     let error = |ids: &[String]| {
         let fit = fits.get(&sorted(ids.to_vec())).or_else(|| fits.get(&Vec::new()));
         held_out::error(fit.map_or(&flown.model, |fit| &fit.model), &testing)
     };
-    // without the truth's own fit there is nothing to compare with
+    // without a fit of the true effects there is no reference error
     record.held_out = fits.contains_key(&sorted(truth.clone())).then(|| HeldOut {
         tuned: error(&[]),
         amended: error(&record.asserted),
@@ -179,7 +180,7 @@ fn sorted(mut ids: Vec<String>) -> Vec<String> {
     ids
 }
 
-/// The output-error fit of `model` with the effects `ids`, each joined at its start.
+/// The output-error fit of `model` with the added effects `ids`, which start from the values in `starts`.
 fn fit(model: &GreyBox, ids: &[String], starts: &Starts, flights: &[amend::Flight]) -> Result<Fit> {
     let mut with = model.clone();
     for id in ids {
@@ -194,7 +195,7 @@ fn fit(model: &GreyBox, ids: &[String], starts: &Starts, flights: &[amend::Fligh
     )?)
 }
 
-/// Values of an effect's coefficients from which a search may start: those known, else clear ones.
+/// Starting values of an effect's coefficients: those in `starts` if they are valid, otherwise clearly visible values.
 fn start(model: &GreyBox, id: &str, starts: &Starts) -> Result<Vec<f64>> {
     if let Some(values) = starts.get(id).filter(|v| model.clone().join(id, v).is_ok()) {
         return Ok(values.clone());
@@ -206,8 +207,8 @@ fn start(model: &GreyBox, id: &str, starts: &Starts) -> Result<Vec<f64>> {
     Ok(own.map(|c| c.value).collect())
 }
 
-/// The fitted parameters of `missing` beside the hidden ones; those hidden as zero are left out, for
-/// an error in per cent means nothing there.
+/// The fitted coefficients of `missing` with their true values. Coefficients whose true value is zero are omitted, because
+/// their relative error is undefined.
 fn parameters(missing: &Missing, fit: &Fit) -> Vec<Found> {
     let own = |name: &str| name.starts_with(&format!("{}.", missing.id));
     let fitted = fit.parameters.iter().filter(|p| own(&p.name));
@@ -221,7 +222,7 @@ fn parameters(missing: &Missing, fit: &Fit) -> Vec<Found> {
     .collect()
 }
 
-/// All seconds of a case.
+/// Total computing time of a case, s.
 pub fn total(seconds: &Seconds) -> f64 {
     seconds.flights + seconds.diagnose + seconds.amend
 }

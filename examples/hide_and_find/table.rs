@@ -1,4 +1,4 @@
-//! The table of the campaign: what must be reached, what is aimed at, what was.
+//! The table of the campaign with required, desired and reached values.
 
 use std::collections::BTreeMap;
 
@@ -8,10 +8,10 @@ use greylag::num::statistics::quantile;
 use crate::record::{HeldOut, Record};
 use crate::search::total;
 
-/// Factor over the minimum detectable amplitude from which an effect is expected to be found.
+/// An effect is expected to be found if its amplitude is at least this multiple of the minimum detectable amplitude.
 const EXPECTED: f64 = 3.0;
 
-/// The table as text, with the cases behind it effect by effect.
+/// The summary table and a table by effect, as text.
 pub fn render(records: &[Record]) -> String {
     let failed = records.iter().filter(|r| r.failure.is_some()).count();
     let mut out = format!("{}\n", summary(records));
@@ -44,7 +44,7 @@ fn header<const N: usize>(names: [&str; N]) -> Table {
     table
 }
 
-/// Share of `records` for which `holds`, with their number.
+/// Percentage and number of the `records` for which `holds` returns true, as text.
 fn share<'a>(
     records: impl IntoIterator<Item = &'a Record>,
     holds: impl Fn(&Record) -> bool,
@@ -57,7 +57,7 @@ fn share<'a>(
     }
 }
 
-/// Median and another quantile of what is finite, times `unit`.
+/// The median and the quantile `other` of the finite `values`, multiplied by `unit`, as text.
 fn two(values: impl Iterator<Item = f64>, other: f64, unit: f64, places: usize) -> String {
     let values: Vec<f64> = values.filter(|x| x.is_finite()).collect();
     if values.is_empty() {
@@ -68,8 +68,8 @@ fn two(values: impl Iterator<Item = f64>, other: f64, unit: f64, places: usize) 
 }
 
 fn summary(records: &[Record]) -> Table {
-    // a case without an answer is not left out: it counts as not found; one whose effect its flights hardly
-    // show is, by the diagnosis' own minimum detectable amplitude
+    // a case without a diagnosis counts as not found. A case is omitted if its amplitude is too small compared with the
+    // minimum detectable amplitude of its own diagnosis
     let part = |name: &'static str| move |r: &&Record| r.part == name;
     let effects: Vec<&Record> = records.iter().filter(part("effects")).collect();
     let visible = |r: &&Record| r.reached >= EXPECTED;
@@ -181,7 +181,7 @@ fn summary(records: &[Record]) -> Table {
     table
 }
 
-/// Effects that cannot be flown at an amplitude at which they ought to be found, with what is reached.
+/// The effects that cannot be flown at an amplitude at which they are expected to be found, as text.
 fn never_clear(records: &[Record]) -> String {
     let mut most: BTreeMap<&str, f64> = BTreeMap::new();
     for r in records.iter().filter(|r| r.part == "effects") {
@@ -202,19 +202,19 @@ fn never_clear(records: &[Record]) -> String {
     )
 }
 
-/// Whether the truth is ranked first.
+/// Whether the true effect is ranked first.
 fn first(r: &Record) -> bool {
     r.truth.first().is_some_and(|truth| r.ranked.first() == Some(truth))
 }
 
-/// Whether the truth is among the first three, or named as what cannot be distinguished from the first.
+/// Whether the true effect is among the first three, or reported as indistinguishable from the first.
 fn near(r: &Record) -> bool {
     let Some(truth) = r.truth.first() else { return false };
     r.ranked.iter().take(3).any(|id| id == truth)
         || r.ranked.first().is_some_and(|first| r.is_alike(first, truth))
 }
 
-/// Whether anything is asserted that is neither true nor reported as indistinguishable from it.
+/// Whether an effect is asserted that is neither true nor reported as indistinguishable from a true effect.
 fn wrong(r: &Record) -> bool {
     let is =
         |id: &String| r.truth.contains(id) || r.truth.iter().any(|truth| r.is_alike(id, truth));
@@ -274,7 +274,7 @@ fn by_effect(records: &[Record]) -> Table {
     table
 }
 
-/// Effects that are ranked first in its place, with their counts.
+/// The effects that are ranked first instead of `id`, with their counts.
 fn mistaken<'a>(records: impl Iterator<Item = &'a Record>, id: &str) -> String {
     let mut others: Vec<(String, usize)> = Vec::new();
     for other in records.filter_map(|r| r.ranked.first()).filter(|other| *other != id) {

@@ -1,4 +1,4 @@
-//! Effects drawn from a grammar.
+//! Random effects, drawn from two grammars of formulas.
 
 use std::error::Error;
 
@@ -6,10 +6,10 @@ use greylag::num::stream::{Stream, stream};
 use greylag::physics::formula::{Written, register};
 use rand::RngExt;
 
-/// Streams of the effects of each grammar.
+/// Ids of the random streams of the two grammars.
 const DRAW: u64 = 3100;
 const OUTSIDE: u64 = 3101;
-/// Variables with the size that they have in the test flights.
+/// Variables with their typical size in the test flights.
 pub const VARIABLES: [(&str, f64); 8] = [
     ("alpha", 0.1),
     ("beta", 0.06),
@@ -20,7 +20,7 @@ pub const VARIABLES: [(&str, f64); 8] = [
     ("elevator", 0.08),
     ("throttle", 0.4),
 ];
-/// Channels with their factor and an amount of it that shows in a few minutes of flight.
+/// Channels, each with the factor of its force or moment, and a coefficient that is detectable in a few minutes of flight.
 pub const CHANNELS: [(&str, &str, f64); 6] = [
     ("drag", "qbar*S", 0.02),
     ("lift", "qbar*S", 0.06),
@@ -42,14 +42,15 @@ pub struct Drawn {
     pub shape: String,
 }
 
-/// A shape with its amount at the size of its variables, and these.
+/// A shape, its value at the typical size of its variables, and these variables.
 type Shape = (String, f64, Vec<&'static str>);
 
 fn pick<'a, T>(random: &mut Stream, all: &'a [T]) -> &'a T {
     &all[random.random_range(0..all.len() as u32) as usize]
 }
 
-/// A shape of two variables or one: forms of the library of `propose`, and one that it lacks (`tanh`).
+/// An effect with a shape of one or two variables. The shape is a form of the library of `propose`, or `tanh`, which the
+/// library lacks.
 pub fn inside(seed: u64) -> Result<Drawn, Box<dyn Error>> {
     let mut random = stream(seed, &[DRAW]);
     let &(channel, factor, size) = pick(&mut random, &CHANNELS);
@@ -69,7 +70,7 @@ pub fn inside(seed: u64) -> Result<Drawn, Box<dyn Error>> {
     finished(seed, &mut random, (channel, factor, size), shape)
 }
 
-/// A shape that the library of `propose` does not hold; the last two are not among its free forms either.
+/// An effect with a shape that the library of `propose` lacks. The last two shapes are not among its free forms either.
 pub fn outside(seed: u64) -> Result<Drawn, Box<dyn Error>> {
     let mut random = stream(seed, &[OUTSIDE]);
     let &(channel, factor, size) = pick(&mut random, &CHANNELS);
@@ -101,7 +102,7 @@ fn finished(
     (shape, full, mut variables): Shape,
 ) -> Result<Drawn, Box<dyn Error>> {
     let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
-    // throttle acts without the air, as a thrust line beside the centre of gravity does
+    // an effect of the throttle does not depend on dynamic pressure, like that of an offset thrust line
     let (factor, unit, size) = match (shape == "throttle", factor) {
         (false, factor) => (factor, "", size),
         (true, "qbar*S") => ("1", "N", 125.0 * size),

@@ -1,10 +1,10 @@
-//! Comparison of a proposal with the effect that was hidden.
+//! Comparison of a proposed formula with the hidden effect.
 
 use greylag::sysid::diagnose::{Proposal, trend};
 
 use super::draw::{CHANNELS, Drawn, VARIABLES};
 
-/// The variables of a formula, a rate the same whatever it is divided by.
+/// The variables of a formula. A body rate counts as its dimensionless form.
 fn variables(formula: &str) -> Vec<&'static str> {
     let has = |v: &str| {
         let part = |c: char| c.is_alphanumeric() || c == '_';
@@ -15,7 +15,7 @@ fn variables(formula: &str) -> Vec<&'static str> {
     all
 }
 
-/// The shape of a formula: what follows its coefficient and the factor of its channel.
+/// The shape of a formula: the part after its coefficient and the factor of its channel.
 fn shape(formula: &str) -> &str {
     let (_, product) = formula.split_once("k*").unwrap_or(("", formula));
     let factors = CHANNELS.iter().filter_map(|(_, factor, _)| {
@@ -24,7 +24,7 @@ fn shape(formula: &str) -> &str {
     factors.min_by_key(|rest| rest.len()).unwrap_or(product)
 }
 
-/// Whether two shapes are the same up to the order of a product and a fifth of a constant.
+/// Whether two shapes are equal, where factors may have another order and constants may differ by a fifth.
 fn same_form(found: &str, hidden: &str) -> bool {
     let parts = |text: &str| {
         let (mut words, mut numbers) = (Vec::new(), Vec::new());

@@ -1,9 +1,12 @@
-//! Effects drawn from a grammar, hidden in JSBSim, and what `propose` makes of the flights; and nulls.
+//! Hides random effects in JSBSim and tests which formulas `propose` finds for them in the flights.
 //!
 //! `cargo run --release --ignore-rust-version --no-default-features --features sitl --example propose_hidden --
-//! inside 9000 10 >> results/propose-hidden.jsonl`; `outside` draws shapes that the library lacks, `nulls` hides
-//! nothing. With the name of a folder behind it writes the signals of each case there, for
-//! `tests/formulas_by_others.py`. One line of JSON a seed; seeds must not be those of earlier runs.
+//! inside 9000 10 >> results/propose-hidden.jsonl`
+//!
+//! The arguments are a grammar, the first seed and the number of seeds. `inside` draws shapes of the library, `outside` draws
+//! shapes that the library lacks, and `nulls` hides nothing. If a folder is named as a fourth argument, the signals of each
+//! case are written there for `tests/formulas_by_others.py`. Each seed gives one line of JSON. The seeds must differ from
+//! those of earlier runs.
 
 mod draw;
 mod judge;
@@ -24,7 +27,7 @@ use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
 use greylag::sysid::progress::ignore_progress;
 
-/// A model with the flights of an aircraft that has more to it.
+/// A model, and flights of an aircraft with an effect that the model lacks.
 struct Case {
     seed: u64,
     model: GreyBox,
@@ -57,7 +60,7 @@ fn flown(seed: u64, missing: Vec<Missing>) -> Result<Case, Box<dyn Error>> {
 }
 
 impl Case {
-    /// The proposal with or without free forms, and how long it took, s.
+    /// The proposal with or without free forms, and its computing time, s.
     fn proposal(&self, free_forms: bool) -> Result<(Proposal, f64), Box<dyn Error>> {
         let options = Options { seed: self.seed, free_forms, ..Options::default() };
         let start = Instant::now();
@@ -77,7 +80,8 @@ impl Case {
     }
 }
 
-/// Flies a seed and judges what is found with the library alone and with free forms.
+/// Flies the case of a seed. Returns the comparison of the proposals with the hidden effect as JSON, with the library alone
+/// and with free forms.
 fn line(what: &str, seed: u64, export: Option<&Path>) -> Result<serde_json::Value, Box<dyn Error>> {
     let hidden = match what {
         "inside" => Some(draw::inside(seed)?),
@@ -103,7 +107,7 @@ fn line(what: &str, seed: u64, export: Option<&Path>) -> Result<serde_json::Valu
     let (free, seconds) = case.proposal(true)?;
     line["free"] = judge::judged(&free, hidden.as_ref());
     line["seconds"] = ((10.0 * seconds).round() / 10.0).into();
-    // without a search of free forms both are the same
+    // if free forms were not searched, both proposals are the same
     if free.free.is_some() {
         let (library, seconds) = case.proposal(false)?;
         line["library"] = judge::judged(&library, hidden.as_ref());

@@ -1,4 +1,4 @@
-//! Timings without a counterpart: TD3's updates, imagination, policies, the processor's peak.
+//! Timings of TD3 updates, simulated aircraft, policies and the processor's peak performance.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -19,10 +19,10 @@ use crate::problem::{self, Scoring};
 use crate::processor::{Operations, narrow_peak, peak, steps_per_second};
 use crate::{Timed, clock, median};
 
-/// What one core of a Raspberry Pi 5 can do, FLOP/s: 2.4 GHz, two pipes of four fused multiply-adds.
+/// Peak performance of one core of a Raspberry Pi 5, FLOP/s: 2.4 GHz with two pipelines of four fused multiply-adds.
 const PI_PEAK: f64 = 38.4e9;
 
-/// Updates of Table VII.
+/// Makes a function that times TD3 updates with the hyperparameters of Table VII.
 pub fn updates() -> Result<impl FnMut(usize) -> Result<Timed>> {
     let mut td3 = Td3::new(Hyperparameters::default(), &mut stream::stream(1, &[]))?;
     let mut replay = Replay::new(10_000);
@@ -44,13 +44,13 @@ pub fn updates() -> Result<impl FnMut(usize) -> Result<Timed>> {
             replay.draw(&mut rng, 256, &mut batch);
             td3.update(&batch, &mut rng);
         }
-        // every second update is of the actor, too: their mean counts
+        // only every second update includes the actor, so the mean time is used
         let mean = (clock::now() - start) / calls as f64;
         Ok(Timed { seconds: vec![mean], value: 0.0 })
     })
 }
 
-/// Prints the figures that stand alone.
+/// Prints the timings for which there is no comparison.
 pub fn print(scorings: &[Scoring]) -> Result<()> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
     imagine(GreyBox::load(&folder.join("jsbsim.toml"))?);
@@ -61,7 +61,7 @@ pub fn print(scorings: &[Scoring]) -> Result<()> {
     estimate(scorings)
 }
 
-/// Steps of 64 aircraft.
+/// Prints the number of simulation steps per second with 64 aircraft.
 fn imagine(model: GreyBox) {
     let mut world = Imagination::new(Arc::new(model), 64, Stratified::new(1, 0, 0.0));
     let action = [Block::zero(); 3];
@@ -76,7 +76,7 @@ fn imagine(model: GreyBox) {
     println!("imagined steps: {:.1} million a second   asked: 1", rate / 1e6);
 }
 
-/// The time of one decision in flight.
+/// Prints the time of one policy evaluation, alone and in SIMD lanes.
 fn act(width: usize) -> Result<()> {
     let settings = Hyperparameters { actor: vec![width; 2], ..Hyperparameters::default() };
     let network = Dense::uniform(&settings.actor_sizes(), &mut stream::stream(1, &[]))?;
@@ -107,7 +107,7 @@ fn act(width: usize) -> Result<()> {
     Ok(())
 }
 
-/// RK4 of the bare prior in lanes, beside what the processor can do at most.
+/// Prints the speed of RK4 steps of the prior without a residual in SIMD lanes, and its fraction of the processor's peak.
 fn share_of_peak(prior: &GreyBox) {
     let state = State { roll: 0.2, pitch: 0.1, alpha: 0.05, beta: 0.01, ..State::NEUTRAL };
     let controls =
@@ -135,7 +135,8 @@ fn share_of_peak(prior: &GreyBox) {
     );
 }
 
-/// What the hybrid planner would take on a Raspberry Pi 5, from the same in vectors of four.
+/// Estimates the time of the hybrid planner on a Raspberry Pi 5. The time is measured here with vectors of four numbers and
+/// scaled by the ratio of the peak performances.
 fn estimate(scorings: &[Scoring]) -> Result<()> {
     let most = narrow_peak();
     println!(

@@ -1,4 +1,4 @@
-//! burn's part: the rollout loss by its autodiff, plans scored in its tensors.
+//! The tasks in burn: the rollout loss with its automatic differentiation, and plans scored with its tensors.
 
 use anyhow::Result;
 use burn::tensor::DType;
@@ -13,7 +13,7 @@ use crate::in_burn::{Column, InBurn, Octet, Place, Rows, columns};
 use crate::problem::{PLANS, Rollouts, STEPS, Scoring};
 use crate::{Timed, clock};
 
-/// A training step: forward, and backward on a new tape.
+/// Makes a function that times training steps: the loss, and its gradient by reverse-mode differentiation.
 pub fn rollouts(problem: &Rollouts) -> impl FnMut(usize) -> Result<Timed> {
     let place = Place::new(DType::F32);
     let bare = InBurn::new(&place, &problem.prior, &problem.scales(), &problem.network);
@@ -35,7 +35,7 @@ pub fn rollouts(problem: &Rollouts) -> impl FnMut(usize) -> Result<Timed> {
     }
 }
 
-/// Scores plans in tensors.
+/// The model, the networks and the inputs of plan scoring, as tensors.
 struct Scorer {
     model: InBurn,
     actor: Mlp,
@@ -47,7 +47,7 @@ struct Scorer {
     unit: Column,
 }
 
-/// A surface: two last inputs, outputs, clipped outputs.
+/// State of a surface: the last two inputs, the last two outputs and the last two clipped outputs of its filter.
 type Surface = [Column; 6];
 
 pub fn scoring(problem: &Scoring) -> impl FnMut(usize) -> Result<Timed> + '_ {

@@ -1,4 +1,4 @@
-//! Times training, planning and policies beside burn and PyTorch, on one core, in one run.
+//! Compares the speed of training, planning and policies with burn and PyTorch, on one core.
 //!
 //! ```text
 //! examples/side_by_side/setup target/torch-venv       # PyTorch from PyPI: 3 GB, once; not needed
@@ -6,8 +6,8 @@
 //!     [--python target/torch-venv/bin/python] [--rounds 9]
 //! ```
 //!
-//! The methods of a task take turns, round after round. Times are the processor's, not the clock's, so that
-//! other programs count little; what is printed are medians of the rounds, and medians of their ratios.
+//! In each round, all methods of a task run one after the other. The times are processor times, which other programs hardly
+//! affect. The printed times are medians over the rounds, and the printed ratios are medians of the ratios in each round.
 
 mod alone;
 mod burn_side;
@@ -29,23 +29,23 @@ use greylag::model::Integrator;
 use problem::{BATCH, PLANS, Rollouts, STEPS, Scoring};
 use torch::Torch;
 
-/// Calls that were timed, and what the last of them came to.
+/// Times of calls, and the result of the last call.
 #[derive(Clone, Debug, Default, serde::Deserialize)]
 pub struct Timed {
-    /// Time of each call, or of the mean of some, s.
+    /// Time of each call, or the mean time of several calls, s.
     pub seconds: Vec<f64>,
     /// Result of the last call.
     pub value: f64,
 }
 
-/// A way to do a task.
+/// An implementation of a task.
 struct Method<'a> {
     name: &'static str,
-    /// How many times our time it is asked to take at least.
+    /// Required ratio of this method's time to Greylag's.
     asked: Option<f64>,
-    /// Expected result, to a thousandth.
+    /// Expected result, with a relative tolerance of 0.001; `None` if the result is not checked.
     expected: Option<f64>,
-    /// Makes a number of calls.
+    /// Makes and times the given number of calls.
     run: Box<dyn FnMut(usize) -> Result<Timed> + 'a>,
 }
 
@@ -68,8 +68,8 @@ fn median(mut numbers: Vec<f64>) -> f64 {
     numbers[numbers.len() / 2]
 }
 
-/// Lets the methods take turns for `rounds` rounds of `calls` calls, and prints a line for each. The first
-/// is ours.
+/// Runs all methods in each of `rounds` rounds, with `calls` calls each, and prints a line for each method. The first method
+/// must be Greylag's.
 fn compare(task: &str, [rounds, calls]: [usize; 2], mut methods: Vec<Method>) -> Result<()> {
     let mut seconds = vec![Vec::new(); methods.len()];
     for _ in 0..rounds {
@@ -93,7 +93,7 @@ fn compare(task: &str, [rounds, calls]: [usize; 2], mut methods: Vec<Method>) ->
     Ok(())
 }
 
-/// Training step of Greylag.
+/// Makes a function that times Greylag's training steps.
 fn train(problem: &Rollouts) -> impl FnMut(usize) -> Result<Timed> + '_ {
     let subject = Subject {
         scales: problem.scales(),
@@ -115,7 +115,8 @@ fn train(problem: &Rollouts) -> impl FnMut(usize) -> Result<Timed> + '_ {
     }
 }
 
-/// A tick of our planner: sampling and refitting included, its rollouts in four turns.
+/// Makes a function that times ticks of Greylag's planner. A tick includes sampling and refitting, with its rollouts in four
+/// iterations.
 fn plan(problem: &Scoring) -> Result<impl FnMut(usize) -> Result<Timed> + '_> {
     let source = Source { model: &problem.model, agent: Some(&problem.agent), changes: &[] };
     let mut controller = control::build(ControllerKind::Hybrid, source)?;
@@ -181,7 +182,7 @@ fn main() -> Result<()> {
         compare(&task, [rounds, 3], methods)?;
     }
     for problem in &scorings {
-        // the others score given plans; our planner draws its own
+        // the other methods score given plans; Greylag's planner draws its own
         let value = problem.expected();
         let burn = Method::new("burn", burn_side::scoring(problem));
         let mut methods =

@@ -1,4 +1,4 @@
-//! The sums that all sides are given, with what PyTorch needs of them.
+//! The problems that all methods solve, and their description for PyTorch.
 
 use std::path::Path;
 
@@ -20,14 +20,14 @@ use serde_json::{Value, json};
 
 use crate::in_burn::{levers, matrix};
 
-/// Steps of a training rollout, and how many there are.
+/// Number of steps of a training rollout. `BATCH` is the number of rollouts.
 pub const STEPS: usize = 20;
 pub const BATCH: usize = 64;
-/// Plans that are scored, and their steps.
+/// Number of plans that are scored. `HORIZON` is the number of their steps.
 pub const PLANS: usize = 1024;
 pub const HORIZON: usize = 5;
 
-/// A step of training: the rollout loss with its gradient.
+/// The problem of a training step: the rollout loss with its gradient.
 pub struct Rollouts {
     pub prior: GreyBox,
     pub network: Dense,
@@ -36,7 +36,7 @@ pub struct Rollouts {
     pub windows: Vec<Window>,
 }
 
-/// Plans to be scored, from one state.
+/// The problem of plan scoring: plans that all start from one state.
 pub struct Scoring {
     pub name: &'static str,
     pub model: GreyBox,
@@ -45,7 +45,7 @@ pub struct Scoring {
     pub agent: Agent,
     pub seen: Observation,
     pub target: Target,
-    /// A step after the other, `[plan, action]`.
+    /// For each step of the horizon, the actions of all plans.
     pub actions: Vec<Vec<[f32; ACTIONS]>>,
 }
 
@@ -55,7 +55,7 @@ pub fn prior() -> Result<GreyBox> {
     Ok(GreyBox::load(&folder.join("prior.toml"))?)
 }
 
-/// A residual's network that is far from silent; its weights do not change the time.
+/// A residual network with random weights. Its output is not negligible. The weights do not affect the computing time.
 fn residual() -> Result<Dense> {
     Ok(Dense::uniform(&[INPUTS, 64, 64, OUTPUTS], &mut stream::stream(1, &[]))?)
 }
@@ -93,7 +93,7 @@ impl Rollouts {
         Scales::new(&self.prior.airframe, self.prior.scale())
     }
 
-    /// For PyTorch; both schemes through time take the same.
+    /// The problem as JSON for PyTorch. It is the same for both integration schemes.
     pub fn told(&self) -> Value {
         let gather = |k: usize, get: &dyn Fn(&Track, usize) -> Value| -> Vec<Value> {
             let at = |w: &Window| get(&self.tracks[w.track as usize], w.start as usize - 1 + k);
@@ -147,7 +147,7 @@ fn told_model(model: &GreyBox, scales: &Scales, network: &Dense) -> Value {
     })
 }
 
-/// Networks of these hidden layers.
+/// A policy with random networks, where `actor` and `critic` are the sizes of the hidden layers.
 fn agent(model: &GreyBox, actor: &[usize], critic: &[usize]) -> Result<Agent> {
     let mut rng = stream::stream(2, &[]);
     let mut network = |sizes: Vec<usize>| Dense::uniform(&sizes, &mut rng);
@@ -168,7 +168,7 @@ fn agent(model: &GreyBox, actor: &[usize], critic: &[usize]) -> Result<Agent> {
 }
 
 impl Scoring {
-    /// The critics of its policy, which has some.
+    /// The critics of the policy.
     pub fn critics(&self) -> &[Critic; 2] {
         self.agent.critics.as_deref().expect("made with critics")
     }
@@ -198,8 +198,7 @@ impl Scoring {
         })
     }
 
-    /// The mean worth of all plans, one by one in double precision, by the equations that the planner
-    /// is made of.
+    /// The mean return of all plans with the terminal value, computed for one plan after the other in double precision.
     pub fn expected(&self) -> f64 {
         let figures = &self.model.airframe.actuators;
         let task = Task::PAPER;
@@ -230,7 +229,7 @@ impl Scoring {
         self.model.atmosphere.density_at(self.seen.altitude)
     }
 
-    /// The problem as JSON, for PyTorch.
+    /// The problem as JSON for PyTorch.
     pub fn told(&self) -> Value {
         let (figures, task) = (&self.model.airframe.actuators, Task::PAPER);
         let [one, two] = self.critics();
@@ -258,7 +257,7 @@ impl Scoring {
     }
 }
 
-/// Both problems as JSON, for PyTorch.
+/// All problems as JSON for PyTorch.
 pub fn told(rollouts: &Rollouts, scorings: &[Scoring]) -> Value {
     let settings = Hyperparameters::default();
     let scorings: serde_json::Map<_, _> =

@@ -1,4 +1,4 @@
-//! Peak performance of the processor, and the operations of the prior.
+//! Peak performance of the processor, and number of operations of a model step.
 
 use std::cell::Cell;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -10,7 +10,7 @@ use greylag::num::{Avx2, Avx512};
 use greylag::num::{BASE_FUSED, Base, Packed, ROW, Real};
 use greylag::physics::{Controls, State};
 
-/// Fused multiply-adds in single precision that one core makes in a second, times two.
+/// Peak performance of one core in single precision, FLOP/s. A fused multiply-add counts as two operations.
 pub fn peak() -> f64 {
     let best = |run: &dyn Fn() -> f64| (0..20).map(|_| run()).fold(0.0, f64::max);
     #[cfg(target_arch = "x86_64")]
@@ -24,7 +24,8 @@ pub fn peak() -> f64 {
     best(&|| chains::<Base<BASE_FUSED>, 3>())
 }
 
-/// Peak in vectors of four, as NEON has: multiplications with additions where none is fused.
+/// Peak performance in vectors of four numbers, as in NEON, FLOP/s. A multiplication and an addition replace the fused
+/// multiply-add if the baseline has none.
 pub fn narrow_peak() -> f64 {
     let run = chains::<Base<BASE_FUSED>, 3>;
     (0..20).map(|_| run()).fold(0.0, f64::max)
@@ -42,7 +43,8 @@ fn peak_avx2() -> f64 {
     chains::<Avx2<true>, 5>()
 }
 
-/// `C` independent chains of blocks: enough to hide the latency of each.
+/// Speed of multiply-adds in `C` independent chains of blocks, FLOP/s. Independent chains hide the latency of the
+/// instruction.
 #[inline(always)]
 fn chains<R: Packed, const C: usize>() -> f64 {
     const ROUNDS: usize = 1_000_000;
@@ -67,26 +69,26 @@ thread_local! {
     static COUNTS: Cell<Operations> = const { Cell::new(Operations::NONE) };
 }
 
-/// Operations that were made.
+/// Numbers of floating-point operations.
 #[derive(Clone, Copy, Debug)]
 pub struct Operations {
     /// Number of additions, subtractions and multiplications.
     pub simple: u64,
     /// Number of fused multiply-adds.
     pub fused: u64,
-    /// Divisions and square roots.
+    /// Number of divisions and square roots.
     pub divisions: u64,
-    /// Sines with their cosines.
+    /// Number of sines with their cosines.
     pub sines: u64,
 }
 
-/// Additions and multiplications of a sine with its cosine as lanes make them, comparisons left out.
+/// Number of additions and multiplications in the SIMD sine and cosine, without comparisons.
 const SINE: u64 = 26;
 
 impl Operations {
     const NONE: Operations = Operations { simple: 0, fused: 0, divisions: 0, sines: 0 };
 
-    /// Floating-point operations, a division being one.
+    /// Total number of floating-point operations. A division counts as one.
     pub fn all(&self) -> u64 {
         self.simple + 2 * self.fused + self.divisions + SINE * self.sines
     }
@@ -107,7 +109,7 @@ impl Operations {
     }
 }
 
-/// A number that counts what is done with it.
+/// A number that counts the operations on it.
 #[derive(Clone, Copy, Debug)]
 struct Counted(f64);
 
@@ -143,7 +145,7 @@ impl SubAssign for Counted {
         *self = *self - other;
     }
 }
-// a change of sign is no arithmetic: it goes into the operation that follows
+// a change of sign is not counted, because it is part of the operation that follows
 impl Neg for Counted {
     type Output = Counted;
     fn neg(self) -> Counted {
@@ -179,10 +181,10 @@ impl Real for Counted {
     }
 }
 
-/// Blocks of aircraft that are stepped in turns.
+/// Number of blocks of aircraft, which are stepped one after the other.
 const BLOCKS: usize = 64;
 
-/// Steps of `model` that one core makes in a second, in lanes.
+/// Number of steps of `model` per second on one core in SIMD lanes.
 pub fn steps_per_second(model: &GreyBox, state: &State, controls: &Controls) -> f64 {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx512f") {

@@ -1,4 +1,4 @@
-//! PyTorch's part: a process that is asked over its standard input.
+//! The tasks in PyTorch: a process that receives requests on its standard input.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 
 use crate::Timed;
 
-/// The process; it ends when its input does.
+/// The process. It ends when its standard input is closed.
 pub struct Torch {
     child: Child,
     ask: ChildStdin,
@@ -17,7 +17,7 @@ pub struct Torch {
 }
 
 impl Torch {
-    /// Starts the script under `python` with `problem`.
+    /// Starts the PyTorch script with the interpreter `python` and the description `problem`.
     pub fn start(python: &Path, problem: &serde_json::Value) -> Result<Torch> {
         let mut file = tempfile::NamedTempFile::new()?;
         serde_json::to_writer(&mut file, problem)?;
@@ -27,7 +27,7 @@ impl Torch {
         let mut child = Command::new(python)
             .arg(script)
             .arg(file.path())
-            // one thread for whatever stands under PyTorch, too
+            // the libraries below PyTorch also use one thread
             .envs(["OMP_NUM_THREADS", "MKL_NUM_THREADS"].map(|name| (name, "1")))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -40,7 +40,7 @@ impl Torch {
         Ok(Torch { child, ask, answers, _problem: file })
     }
 
-    /// Seconds of `calls` calls of `task`.
+    /// Times `calls` calls of `task`.
     pub fn time(&mut self, task: &str, calls: usize) -> Result<Timed> {
         writeln!(self.ask, "{task} {calls}")?;
         let mut line = String::new();
@@ -53,7 +53,7 @@ impl Torch {
 
 impl Drop for Torch {
     fn drop(&mut self) {
-        // its work is of no use any more, and nobody can handle an error here
+        // the process is no longer needed, and an error cannot be handled here
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -179,7 +179,7 @@ class Rollouts:
             else:
                 s, f_p, f_a = self.step(*inputs)
             off = s - self.states[k + 1]
-            # the short way round
+            # roll errors are wrapped to half a turn
             turns = torch.zeros_like(off)
             turns[:, 0] = torch.round(off[:, 0].detach() / math.tau) * math.tau
             error = error + (((off - turns) / self.scale) ** 2).sum()

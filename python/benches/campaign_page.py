@@ -1,9 +1,10 @@
-"""Puts what `greylag campaign report` says into a page of the documentation, between the marks that the page has for it.
+"""Inserts the output of `greylag campaign report` into a page of the documentation.
 
     python python/benches/campaign_page.py --greylag target/release/greylag --campaign params/campaigns/medium.toml \\
         --results results/campaign-medium.jsonl results/campaign-medium.md
 
-The page has `<!-- claims -->` … `<!-- end -->` and `<!-- tables -->` … `<!-- end -->`; what stands outside of these is left alone.
+The text between `<!-- claims -->` and `<!-- end -->`, and between `<!-- tables -->` and `<!-- end -->`, is replaced. The rest of the
+page is not changed.
 """
 
 import argparse
@@ -14,7 +15,7 @@ from pathlib import Path
 
 
 def headed(tables):
-    """Tables without padding, each under a heading: what `--tables` writes has the title as a line of its own."""
+    """The tables of `--tables` without padding. The line with the title of a table becomes a heading."""
     lines = []
     for line in tables.splitlines():
         if line.startswith("|"):
@@ -29,7 +30,7 @@ def headed(tables):
 
 
 def between(page, mark, text):
-    """The page with `text` between a mark and its end."""
+    """The page with `text` between the comment `mark` and the next end mark."""
     pattern = re.compile(rf"(<!-- {mark} -->\n).*?(\n<!-- end -->)", re.DOTALL)
     if not pattern.search(page):
         raise SystemExit(f"the page has no <!-- {mark} --> with an <!-- end -->")
@@ -37,7 +38,7 @@ def between(page, mark, text):
 
 
 def main():
-    """Writes the page."""
+    """Runs the report and writes the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--greylag", required=True)
     parser.add_argument("--campaign", required=True)

@@ -1,4 +1,7 @@
-"""What judges every policy of ``other_agents.py`` and ``rltools_td3.py``. Without PyTorch, beside which RLtools refuses MKL."""
+"""Evaluates the policies of ``other_agents.py`` and ``rltools_td3.py`` in JSBSim.
+
+This module must not import PyTorch: RLtools cannot use MKL in a process that has imported PyTorch.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,10 @@ from pathlib import Path
 
 
 def judge(folder: Path, asked: argparse.Namespace) -> dict[str, dict[str, float]]:
-    """Settled error and losses by group of targets, flown in JSBSim."""
+    """Evaluates the policy in ``folder`` in JSBSim.
+
+    Returns for each group of targets the settled errors in degrees, the fraction of diverged flights and the settling time in s.
+    """
     out = folder / "evaluation.json"
     command = [str(asked.greylag), "evaluate", "--controller", "policy", "--policy", str(folder)]
     command += ["--targets", str(asked.targets), "--json", str(out), "--force"]

@@ -1,12 +1,12 @@
-"""Processor time and peak memory of `greylag logs info` beside the readers that people use, on the same files.
+"""Compares processor time and peak memory of `greylag logs info` with those of common log readers on the same files.
 
     pip install numpy pyulog pymavlink mavparser polars
     python python/benches/log_readers.py [--greylag target/release/greylag] [--minutes 30] [--large 1000]
 
-Writes a ULog, a DataFlash .bin, a .tlog and a CSV of one made-up flight into a temporary folder, with topics that nobody asks
-for as real logs have them, runs each reader in a process of its own (one thread) and prints what the system charges it for.
-`--large` is the size in MB of two more files, of which only Greylag's own look is measured; 0 leaves them out. The other
-readers only read; `logs info` judges the channels as well.
+Writes a synthetic flight as ULog, DataFlash .bin, .tlog and CSV to a temporary folder. As in real logs, two thirds of the ULog and
+of the .bin are topics that no reader uses. Each reader runs in a separate process with one thread; the operating system measures its
+time and memory. `--large` is the size in MB of two further files, which only `logs info` reads; 0 omits them. The other readers only
+read a file, while `logs info` also checks its channels.
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-# A started process is charged the memory of the one that starts it as well: files are written by a process of their own.
+# The peak memory of a child process includes that of its parent at the start. This process therefore stays small, and a
+# separate process writes the files.
 if len(sys.argv) > 1 and sys.argv[1] == "write":
     import numpy as np
 
-# Topics that Greylag reads of a ULog: the other reader is asked for the same.
+# Topics that Greylag reads from a ULog. pyulog reads the same topics.
 ULOG_TOPICS = [
     "vehicle_attitude", "vehicle_angular_velocity", "vehicle_acceleration", "airspeed_validated", "vehicle_air_data",
     "vehicle_local_position", "vehicle_status", "actuator_servos", "vehicle_torque_setpoint", "vehicle_thrust_setpoint",
@@ -40,7 +41,7 @@ READERS = {
 
 
 def flight(t: np.ndarray) -> dict[str, np.ndarray]:
-    """A flight of gentle rolling turns at the times `t`, s; SI units, radians."""
+    """Columns of a synthetic flight with alternating turns at the times `t` in s. SI units and radians."""
     v, g, w = 18.0, 9.80665, 1.1
     roll, pitch = 0.6 * np.sin(w * t), 0.05 * np.sin(0.5 * t)
     turn = g * np.tan(roll) / v
@@ -59,7 +60,7 @@ def flight(t: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def interleaved(path: Path, head: bytes, seconds: int, topics: list[tuple[int, np.ndarray]]) -> None:
-    """Writes the topics (rate in Hz, records) second by second, as a logger does."""
+    """Writes the records of the topics (rate in Hz, records) in the order of a logger, second by second."""
     with path.open("wb") as out:
         out.write(head)
         for s in range(seconds):
@@ -75,7 +76,7 @@ def quaternion(f: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def ulog(path: Path, seconds: int) -> None:
-    """A ULog of PX4's present topics; two thirds of it are topics that are not asked for."""
+    """Writes a ULog with topics of the present PX4. Two thirds of the file are topics that no reader uses."""
     topics: list[tuple[int, str, str, list]] = []
     of = lambda rate: flight(np.arange(seconds * rate) / rate + 1.0)
     fast, mid, slow = of(250), of(100), of(10)
@@ -110,7 +111,7 @@ def ulog(path: Path, seconds: int) -> None:
 
 
 def dataflash(path: Path, seconds: int) -> None:
-    """A DataFlash log of ArduPlane's usual records; two thirds of it are records that are not asked for."""
+    """Writes a DataFlash log with the usual records of ArduPlane. Two thirds of the file are records that no reader uses."""
     of = lambda rate: flight(np.arange(seconds * rate) / rate + 1.0)
     fast, mid, slow = of(200), of(50), of(10)
     degrees = [np.degrees(mid[k]) for k in ("roll_rad", "pitch_rad")] + [np.degrees(mid["yaw_rad"]) % 360]
@@ -148,7 +149,7 @@ def dataflash(path: Path, seconds: int) -> None:
 
 
 def tlog(path: Path, seconds: int) -> None:
-    """Telemetry of ArduPlane at the rates of a fast link."""
+    """Writes a telemetry log of ArduPlane with the message rates of a fast link."""
     os.environ["MAVLINK20"] = "1"
     from pymavlink.dialects.v20 import ardupilotmega as m
 
@@ -181,12 +182,12 @@ def csv(path: Path, seconds: int) -> None:
 
 
 def charged(command: list[str]) -> tuple[float, float]:
-    """Processor time in s and peak memory in MB that the system charges a process for."""
+    """Runs a command and returns its processor time in s and its peak memory in MB."""
     env = {**os.environ, "POLARS_MAX_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "RAYON_NUM_THREADS": "1"}
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=env)
     said = process.stderr.read().decode()
     _, status, usage = os.wait4(process.pid, 0)
-    # `logs info` ends with 3 where it has something to say.
+    # The exit status of `logs info` is 3 if it reports problems of the log.
     if os.waitstatus_to_exitcode(status) not in (0, 3):
         sys.exit(f"{command}: {said}")
     return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1000
@@ -198,7 +199,7 @@ def least(command: list[str], rounds: int) -> tuple[float, float]:
 
 
 def written(path: Path, write: Callable[[Path, int], None], seconds: int) -> None:
-    """Writes a file in a process of its own."""
+    """Writes a file in a separate process."""
     subprocess.run([sys.executable, __file__, "write", write.__name__, str(path), str(seconds)], check=True)
 
 

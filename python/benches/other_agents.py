@@ -1,13 +1,13 @@
-"""Agents of Stable-Baselines3 beside greylag's own trainings: same model, same task, same processor time, same judge.
+"""Compares agents of Stable-Baselines3 with greylag's own trainings: same model, task, processor time and evaluation.
 
     python python/benches/other_agents.py --greylag target/release/greylag --out DIR [--cpu-seconds 300] [--seeds 3]
 
-Trains PPO, SAC and TD3 with their usual settings in the shipped learned model (``greylag.LEARNED_MODEL``), and greylag's TD3 and
-analytic policy gradient with ``greylag train policy``, each until it has used ``--cpu-seconds`` of one core. Every policy is exported
-and flown by ``greylag evaluate`` in JSBSim over all targets. Prints a table; DIR/agents.jsonl has a line for each policy. A policy
-whose line is there is not trained again.
+Trains PPO, SAC and TD3 with their usual settings in the shipped learned model (``greylag.LEARNED_MODEL``), each for
+``--cpu-seconds`` of one core. Trains TD3 and the analytic policy gradient of greylag with ``greylag train policy``; the options
+``--td3-steps`` and ``--analytic-updates`` determine their duration. Exports every policy and evaluates it with ``greylag evaluate``
+in JSBSim over all targets. Prints a table. DIR/agents.jsonl has a line for each policy; a policy with a line is not trained again.
 
-PPO's mean is given a tanh at its end, because what greylag flies ends in one.
+A tanh is added to the mean of PPO, because greylag only flies policies with tanh at the output.
 """
 
 from __future__ import annotations
@@ -38,12 +38,13 @@ from judging import judge
 torch.set_num_threads(1)
 OTHERS = ("PPO", "SAC", "TD3")
 OWN = ("greylag TD3", "greylag analytic")
-# Environments flown at once: PPO wants many for its batches; the others learn once a step of all of them.
+# Number of environments. PPO needs many for its batches. SAC and TD3 make as many updates per step as they have
+# environments.
 ENVIRONMENTS = {"PPO": 64, "SAC": 4, "TD3": 4}
 
 
 class BoundedPolicy(ActorCriticPolicy):
-    """PPO's usual networks with ReLU, the mean bounded by tanh."""
+    """The default networks of PPO, with a tanh that bounds the mean."""
 
     def _build(self, lr_schedule) -> None:
         super()._build(lr_schedule)
@@ -52,7 +53,7 @@ class BoundedPolicy(ActorCriticPolicy):
 
 
 class ProcessorTime(BaseCallback):
-    """Ends a training when the process has used so many seconds of processor time in it."""
+    """Ends a training after ``seconds`` of processor time."""
 
     def __init__(self, seconds: float) -> None:
         super().__init__()
@@ -63,10 +64,13 @@ class ProcessorTime(BaseCallback):
 
 
 def train_other(name: str, seed: int, folder: Path, asked: argparse.Namespace) -> dict[str, float]:
-    """Trains an agent of Stable-Baselines3 and exports it."""
+    """Trains an agent of Stable-Baselines3 and exports its policy.
+
+    Returns the number of steps and the processor time in s.
+    """
     envs = ImaginedVecEnv(ENVIRONMENTS[name])
     if name == "PPO":
-        # 64 x 128 steps a round, as rl-zoo has for tasks of this size; discount and the rest as they come
+        # 64 x 128 steps per rollout, as in RL Zoo for tasks of this size; the other settings are the defaults
         agent = PPO(
             BoundedPolicy, envs, seed=seed, device="cpu", n_steps=128, batch_size=256, n_epochs=10,
             policy_kwargs={"net_arch": [128, 128], "activation_fn": torch.nn.ReLU, "log_std_init": -1.0},
@@ -94,7 +98,10 @@ def train_other(name: str, seed: int, folder: Path, asked: argparse.Namespace) -
 
 
 def train_own(name: str, seed: int, folder: Path, asked: argparse.Namespace) -> dict[str, float]:
-    """Trains by ``greylag train policy``; its length is chosen by ``--td3-steps`` and ``--analytic-updates``."""
+    """Trains a policy with ``greylag train policy``.
+
+    Returns the number of steps (TD3) or updates (analytic), and the processor time in s.
+    """
     model = str(greylag.files.shipped(greylag.LEARNED_MODEL).parent)
     command = [
         str(asked.greylag), "train", "policy", "--env", f"model:{model}", "--seed", str(seed), "--out", str(folder),
@@ -113,7 +120,7 @@ def train_own(name: str, seed: int, folder: Path, asked: argparse.Namespace) -> 
 
 
 def table(rows: list[dict]) -> None:
-    """A line for each agent: mean over its seeds, and each seed over all targets of the paper's Table II."""
+    """Prints one line for each agent: means over its seeds, and the mean settled error of each seed over all targets."""
     print("| agent | steps | s of a core | easy, ° | hard corners, ° | all, each seed, ° | diverged |")
     print("|---|---|---|---|---|---|---|")
     for agent in dict.fromkeys(row["agent"] for row in rows):
@@ -131,7 +138,7 @@ def table(rows: list[dict]) -> None:
 
 
 def main() -> None:
-    """Trains, judges, prints."""
+    """Trains the agents, evaluates their policies and prints the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--greylag", type=Path, required=True, help="the program, built with the feature learn")
     parser.add_argument("--out", type=Path, required=True)

@@ -1,13 +1,13 @@
-"""TD3 of RLtools (https://rl.tools) on the task of ``other_agents.py``: same model, same networks, same judge.
+"""Trains TD3 of RLtools (https://rl.tools) for the task of ``other_agents.py``: same model, networks and evaluation.
 
     python python/benches/rltools_td3.py --greylag target/release/greylag --out DIR [--steps 100000] [--seeds 3]
 
-Needs ``pip install 'rltools[mkl]' gymnasium`` beside greylag, g++ and Python's headers: RLtools is compiled when it is first used. Not for
-an environment with PyTorch, beside which RLtools refuses MKL once both are imported.
+Needs greylag, ``pip install 'rltools[mkl]' gymnasium``, g++ and the headers of Python, because RLtools is compiled on first use. The
+process must not import PyTorch: RLtools cannot use MKL with it.
 
-Trains RLtools' TD3 in ``Greylag/Imagined-v0`` (``greylag.LEARNED_MODEL``) for ``--steps`` steps, exports each policy and flies it by
-``greylag evaluate`` in JSBSim over all targets. Prints a row of the table of ``other_agents.py``; DIR/agents.jsonl has a line for each
-policy. Policies that are there already are neither trained nor flown again.
+Trains in ``Greylag/Imagined-v0`` (``greylag.LEARNED_MODEL``) for ``--steps`` steps, exports each policy and evaluates it with
+``greylag evaluate`` in JSBSim over all targets. Prints a row of the table of ``other_agents.py``. DIR/agents.jsonl has a line for each
+policy. Existing policies are neither trained nor evaluated again.
 """
 
 from __future__ import annotations
@@ -32,32 +32,39 @@ import greylag
 from judging import judge
 
 AGENT = "RLtools TD3"
-# Compiled in; what is not here is RLtools' default. Of its three layers two are hidden. The buffer holds all steps, which is the default.
+# Settings at compile time; all others are defaults of RLtools. By default a network has two hidden layers, and the replay buffer
+# holds all steps.
 SETTINGS = {"ACTOR_HIDDEN_DIM": 128, "CRITIC_HIDDEN_DIM": 128, "STEP_LIMIT": 1_000_000}
 VERSIONS = {name: importlib.metadata.version(name) for name in ("rltools", "mkl", "gymnasium")}
 
 
 class Trainer:
-    """RLtools' TD3, compiled once; each seed has environments and networks of its own."""
+    """TD3 of RLtools, compiled once for all seeds. Each seed has its own environment and networks."""
 
     def __init__(self) -> None:
         self.seed = 0
         self.made = rltools.TD3(self._environment, enable_evaluation=False, interface_name="mkl", **SETTINGS)
 
     def _environment(self) -> gym.Env:
-        """One aircraft. RLtools does not look at ``truncated``: it ends an episode by the limit of its specification."""
+        """An environment with one aircraft.
+
+        RLtools ignores ``truncated``. It ends an episode at ``max_episode_steps``.
+        """
         env = gym.make("Greylag/Imagined-v0", max_episode_steps=greylag.envs.STEPS, disable_env_checker=True)
         env.reset(seed=self.seed)
         return env
 
     def begin(self, seed: int) -> Any:
-        """Environment and networks of the seed."""
+        """The state of a training with ``seed``: a new environment and new networks."""
         self.seed = seed
         return self.made.State(seed)
 
 
 def train(asked: argparse.Namespace) -> None:
-    """Trains the seeds side by side and exports them every ``--round`` steps, so that an interrupted run leaves policies of equal steps."""
+    """Trains all seeds in turn, ``--round`` steps at a time, and exports the policies after each round.
+
+    After an interruption all seeds therefore have policies of equal numbers of steps.
+    """
     trainer = Trainer()
     states = {seed: trainer.begin(seed) for seed in range(1, asked.seeds + 1)}
     used = dict.fromkeys(states, 0.0)
@@ -75,12 +82,12 @@ def train(asked: argparse.Namespace) -> None:
 
 
 def place(asked: argparse.Namespace, seed: int, steps: int) -> Path:
-    """The folder of a policy."""
+    """The folder for the policy of ``seed`` after ``steps`` steps."""
     return asked.out / f"RLtools-TD3-{seed}-{steps}"
 
 
 def layers(state: Any) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Weights and biases of the actor, read from the C++ header that RLtools exports."""
+    """The weights and biases of the actor, read from the C++ header that RLtools exports."""
     arrays = [
         np.array([float.fromhex(number.strip().rstrip("f")) for number in numbers.split(",")], np.float32).reshape(
             [int(extent) for extent in shape.split(",")]
@@ -93,7 +100,10 @@ def layers(state: Any) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def export(state: Any, folder: Path, seed: int, steps: int) -> float:
-    """Writes the policy; returns by how much it differs from RLtools' own on 1000 observations of order one."""
+    """Exports the policy to ``folder``.
+
+    Returns the largest difference between its actions and those of RLtools on 1000 random observations.
+    """
     greylag.export_policy(
         folder, layers(state), trained_in=greylag.LEARNED_MODEL, seed=seed, steps=steps, replace=True
     )
@@ -105,7 +115,7 @@ def export(state: Any, folder: Path, seed: int, steps: int) -> float:
 
 
 def main() -> None:
-    """Trains, judges, prints."""
+    """Trains the seeds, evaluates their policies and prints the row of the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--greylag", type=Path, required=True, help="the program, for its command evaluate")
     parser.add_argument("--out", type=Path, required=True)

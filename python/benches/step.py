@@ -1,9 +1,9 @@
-"""How fast a batch of aircraft is stepped: a loop in Python, numpy, greylag; each on one core, side by side.
+"""Measures how many steps of aircraft per second Python, numpy and greylag compute on one core.
 
     python python/benches/step.py [--aircraft 16384] [--seconds 1] [--least 0]
 
-Every line steps the same states of the same model (params/x8/prior.toml, RK4) under the same controls. ``--least`` makes the
-script fail when greylag makes fewer transitions a second than that.
+The first three lines of the table use the same states, controls and model (params/x8/prior.toml, RK4); the others use other models
+or the environments. The script fails if ``Model.step`` with the prior makes fewer transitions per second than ``--least``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import sys
 import time
 from collections.abc import Callable
 
-# one core for numpy as well
+# numpy is limited to one core, too
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
 
 import numpy as np
@@ -25,7 +25,7 @@ STEP = 0.01
 
 
 def rate(seconds: float, transitions: int, step: Callable[[], object]) -> float:
-    """Transitions a second of processor time, the best of the rounds that fit into ``seconds``."""
+    """The transitions per second of processor time: the highest rate of several rounds within ``seconds``."""
     step()
     best, end = 0.0, time.perf_counter() + seconds
     while time.perf_counter() < end:
@@ -39,7 +39,7 @@ def rate(seconds: float, transitions: int, step: Callable[[], object]) -> float:
 
 
 def rk4(model: greylag.Model, states: np.ndarray, controls: np.ndarray) -> np.ndarray:
-    """RK4 in numpy over greylag's derivative, in double precision."""
+    """One RK4 step in numpy with the derivatives of the model, in double precision."""
     k1 = model.derivative(states, controls)
     k2 = model.derivative(states + STEP / 2 * k1, controls)
     k3 = model.derivative(states + STEP / 2 * k2, controls)
@@ -48,7 +48,7 @@ def rk4(model: greylag.Model, states: np.ndarray, controls: np.ndarray) -> np.nd
 
 
 def main() -> None:
-    """Measures and prints."""
+    """Measures all variants and prints their rates."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--aircraft", type=int, default=16384)
     options.add_argument("--seconds", type=float, default=1.0)

@@ -1,28 +1,30 @@
-"""TD-MPC2 (Hansen, Su, Wang 2024) on the task of ``other_agents.py``: same model to train in, same targets to be judged by.
+"""Trains TD-MPC2 (Hansen, Su, Wang 2024) for the task of ``other_agents.py``: same training model, same evaluation targets.
 
     python python/benches/tdmpc2.py --out DIR [--steps 100000] [--seeds 3] [--seconds 400] [--judge-seconds 120]
 
-Needs PyTorch and gymnasium beside greylag, and a GPU: on one core of a processor the planner takes 0.85 s for a step of one aircraft.
+Needs greylag, PyTorch, gymnasium and a GPU. On one core of a CPU the planner takes 0.85 s for one step of one aircraft.
 
-Written anew with the settings of the public code (https://github.com/nicklashansen/tdmpc2, commit e9f5932: one task, 5M parameters,
-``episodic=true``, because an aircraft can be lost). What differs from it:
+This is a new implementation with the settings of the public code (https://github.com/nicklashansen/tdmpc2, commit e9f5932): one task,
+5M parameters, and ``episodic=true``, because an aircraft can be lost. It differs from the public code as follows:
 
-- All seeds train at once, as one batch of networks. They share no weight, gradient norm, scale or transition, but one generator of
-  random numbers beyond the first weights and the targets.
-- ``--lanes`` aircraft of each seed fly at once and are planned for together; then come as many updates as transitions, times
-  ``--updates-per-step``. A transition can be drawn at once, not when its episode has ended, and every start of a sequence is drawn
-  equally often, not every episode.
-- On a GPU the planner computes in half precision, which has the mantissa of TF32, the public code's. Weights are kept in it, too.
-- ``--seconds`` may end a training before ``--steps``; the record says how many steps and updates there were.
+- All seeds are trained at the same time as one batch of networks. Each seed has its own weights, gradient norm, scale and transitions.
+  Initial weights and targets are drawn from the seed. All other random numbers come from one generator for all seeds.
+- ``--lanes`` aircraft of each seed fly at the same time, and one call of the planner plans for all of them. The number of updates
+  after each step is the number of new transitions times ``--updates-per-step``.
+- A transition can be sampled as soon as it is stored, not only after the end of its episode. All start steps of sequences are sampled
+  with the same probability, whereas the public code samples all episodes with the same probability.
+- On a GPU the planner computes in half precision, and the weights are saved in half precision. Its mantissa is as long as that of
+  TF32, in which the public code computes.
+- ``--seconds`` can end a training before ``--steps``. The record has the numbers of steps and updates.
 
-What TD-MPC2 flies is its planner, which ``greylag evaluate`` does not have, so this script flies it in JSBSim (``greylag.X8Env``) by the
-rules of ``greylag evaluate``, with one difference: an aircraft that leaves the envelope of the environment counts as lost there and
-then, as off by 180°. ``--check-judge POLICY --greylag PROGRAM`` flies a policy by both judges. ``--flown-by prior`` flies the policy's mean
-without the planner, which a processor can do.
+The controller that TD-MPC2 trains is a planner. ``greylag evaluate`` does not have this planner, so this script evaluates it in JSBSim
+(``greylag.X8Env``) by the rules of ``greylag evaluate``. There is one difference: an aircraft that leaves the envelope of the
+environment is lost at once, and its error is 180°. ``--check-judge POLICY --greylag PROGRAM`` evaluates a policy both ways.
+``--flown-by prior`` evaluates the mean of the policy without the planner, which is feasible on a CPU.
 
-Prints a row of the table of ``other_agents.py``; DIR/agents.jsonl has a line for each seed. DIR/training.jsonl has the course of the
-training, DIR/flights.jsonl each flight, DIR/TD-MPC2-SEED.pt the weights. What is there already is neither trained nor flown again:
-``--judge-only`` goes on with the flights after an interruption, also with weights of a training that was broken off.
+Prints a row of the table of ``other_agents.py``. DIR/agents.jsonl has a line for each seed, DIR/training.jsonl the learning curve,
+DIR/flights.jsonl the flights, and DIR/TD-MPC2-SEED.pt the weights. Existing results are neither trained nor flown again.
+``--judge-only`` continues the evaluation after an interruption, also with the weights of an incomplete training.
 """
 
 from __future__ import annotations
@@ -62,9 +64,10 @@ except ImportError:
 
 AGENT = "TD-MPC2"
 OBSERVATIONS, ACTIONS = 16, 3
-# Widths are multiples of 8, which is what the tensor cores multiply; what is added is zero and stays so.
+# Number of action inputs of a network. Widths are multiples of 8, the block size of the tensor cores. The padded inputs are zero.
 ACTIONS_WIDE = 8
-# Of the last fifth of an episode, as in src/sim/episode.rs.
+# As in src/sim/episode.rs: number of last steps over which the settled error is computed, error within which a target is reached
+# (°), settled error above which a flight has diverged (°), and error of a lost aircraft (°).
 SETTLED, REACHED_DEG, DIVERGED_DEG, LOST_DEG = 200, 1.0, 10.0, 180.0
 GROUPS = ("easy", "hard_corners")
 VERSIONS = {"torch": str(torch.__version__), "gymnasium": gym.__version__, "numpy": np.__version__}
@@ -72,7 +75,7 @@ VERSIONS = {"torch": str(torch.__version__), "gymnasium": gym.__version__, "nump
 
 @dataclasses.dataclass(frozen=True)
 class Settings:
-    """Those of the public code, under its names."""
+    """Settings of TD-MPC2. Names and default values are those of the public code."""
 
     enc_dim: int = 256
     mlp_dim: int = 512
@@ -104,7 +107,7 @@ class Settings:
     enc_lr_scale: float = 0.3
     grad_clip_norm: float = 20.0
     tau: float = 0.01
-    # of the public code's rules: min(0.995, (1000 / 5 - 1) / (1000 / 5)), max(1000, five episodes)
+    # by the rules of the public code: min(0.995, (1000 / 5 - 1) / (1000 / 5)) and max(1000, steps of five episodes)
     discount: float = 0.995
     seed_steps: int = 5000
 
@@ -113,7 +116,7 @@ if triton is not None:
 
     @triton.jit
     def _fused(x, bias, scale, shift, out, rows, stride, SIZE: tl.constexpr, GROUP: tl.constexpr):  # noqa: N803
-        """A row of :func:`activated`, read and written once."""
+        """Computes one row of :func:`activated`. The row is read once and written once."""
         row = tl.program_id(0).to(tl.int64)
         at, own = tl.arange(0, SIZE), (row // rows) * stride + tl.arange(0, SIZE)
         y = tl.load(x + row * SIZE + at).to(tl.float32) + tl.load(bias + own).to(tl.float32)
@@ -130,12 +133,15 @@ if triton is not None:
         tl.store(out + row * SIZE + at, y.to(out.dtype.element_ty))
 
 
-# Whether planning may use the kernel above; the check at the start of a run says.
+# Whether the planner uses the kernel `_fused`. `fusing` sets it at the start of a run.
 FUSED = False
 
 
 def activated(x: Tensor, bias: Tensor, scale: Tensor, shift: Tensor, group: int) -> Tensor:
-    """Layer normalisation of x + bias, then Mish, or a softmax over each ``group`` of units; x is (networks, rows, units)."""
+    """Layer normalisation of x + bias, followed by an activation; x is (networks, rows, units).
+
+    The activation is Mish if ``group`` is 0, otherwise a softmax over each group of ``group`` units.
+    """
     if FUSED and not torch.is_grad_enabled():
         out = torch.empty_like(x)
         rows, size = x.shape[1:]
@@ -146,7 +152,10 @@ def activated(x: Tensor, bias: Tensor, scale: Tensor, shift: Tensor, group: int)
 
 
 class Net:
-    """The shape of a network of which many lie side by side, each a row of one tensor; a layer multiplies all of them at once."""
+    """The architecture of a network that exists many times.
+
+    The parameters of each network are a row of one tensor. A layer is evaluated for all networks at once.
+    """
 
     def __init__(self, *sizes: int, group: int = 0, zero: bool = False, bins: int = 0) -> None:
         self.layers = list(itertools.pairwise(sizes))
@@ -159,7 +168,7 @@ class Net:
         ]
 
     def begun(self, generator: torch.Generator) -> Tensor:
-        """Parameters of one network."""
+        """Random initial parameters of one network."""
         parts = []
         for (width, units), normed in zip(self.layers, self.normed, strict=True):
             last = not normed
@@ -167,13 +176,13 @@ class Net:
             parts.append(torch.randn(width * units, generator=generator) * std)
             parts.append(torch.zeros(units))
             if last and self.bins:
-                parts[-1][self.bins :] = -30_000.0  # bins that are none: of no weight, and half precision holds it
+                parts[-1][self.bins :] = -30_000.0  # logit of padded bins: their probability is 0; half precision can represent it
             if normed:
                 parts += [torch.ones(units), torch.zeros(units)]
         return torch.cat(parts)
 
     def __call__(self, flat: Tensor, x: Tensor, dropout: float = 0.0) -> Tensor:
-        """(networks, rows, out) of (networks, parameters) and (networks, rows, in)."""
+        """The outputs (networks, rows, out) for parameters (networks, parameters) and inputs (networks, rows, in)."""
         parts = iter(flat.split(self.parts, 1))
         for k, ((width, units), normed) in enumerate(zip(self.layers, self.normed, strict=True)):
             weight, bias = next(parts).view(-1, width, units), next(parts).unsqueeze(1)
@@ -188,22 +197,25 @@ class Net:
 
 
 def wide(size: int) -> int:
-    """The next multiple of 8."""
+    """The smallest multiple of 8 that is at least ``size``."""
     return -(-size // 8) * 8
 
 
 def joined(z: Tensor, action: Tensor) -> Tensor:
-    """What dynamics, reward and value see."""
+    """The input of the dynamics, reward and value networks: the latent state and the padded action."""
     return torch.cat([z, F.pad(action, (0, ACTIONS_WIDE - ACTIONS)).to(z.dtype)], -1)
 
 
 def symlog(x: Tensor) -> Tensor:
-    """Logarithm of both signs."""
+    """The signed logarithm sign(x) ln(1 + |x|)."""
     return x.sign() * x.abs().log1p()
 
 
 class Agents:
-    """World models, values and policies of all seeds. Tensors are (seeds, ...), those of values (seeds * num_q, ...)."""
+    """World models, value functions and policies of all seeds.
+
+    The first dimension of parameters is the seed; that of the value functions is seeds * num_q.
+    """
 
     def __init__(self, settings: Settings, seeds: list[int], device: torch.device) -> None:
         s = self.settings = settings
@@ -228,24 +240,24 @@ class Agents:
         self.rho = s.rho ** torch.arange(s.horizon + 1, device=device)
 
     def pick(self, flat: Tensor) -> Tensor:
-        """Two of each seed's value functions, drawn anew."""
+        """The parameters of two value functions of each seed, which are drawn at random in each call."""
         all_of = flat.view(len(self.seeds), self.settings.num_q, -1)
         drawn = torch.rand(all_of.shape[:2], device=self.device).topk(2).indices
         return all_of[self.of_seed, drawn].flatten(0, 1)
 
     def logits(self, flat: Tensor, x: Tensor, dropout: float = 0.0) -> Tensor:
-        """(seeds, functions, rows, bins) of the value functions in ``flat``."""
+        """The logits (seeds, functions, rows, bins) of the value functions with the parameters ``flat`` at the inputs x."""
         functions = flat.shape[0] // len(self.seeds)
         several = x.unsqueeze(1).expand(-1, functions, -1, -1).flatten(0, 1)
         return self.nets["value"](flat, several, dropout).unflatten(0, (-1, functions))
 
     def scalar(self, logits: Tensor) -> Tensor:
-        """What a distribution over the bins stands for."""
-        x = (logits.softmax(-1) * self.bins).sum(-1)  # a product of matrices would round the bins
+        """The values that distributions over the bins (as logits) encode: the inverse of :func:`symlog` at their means."""
+        x = (logits.softmax(-1) * self.bins).sum(-1)  # a matrix product would round the bins
         return x.sign() * x.abs().expm1()
 
     def two_hot(self, x: Tensor) -> Tensor:
-        """The distribution over the bins that stands for x."""
+        """The two-hot encoding of x: a distribution over two adjacent bins with the mean symlog(x)."""
         s = self.settings
         place = (symlog(x).clamp(s.vmin, s.vmax) - s.vmin) * ((s.num_bins - 1) / (s.vmax - s.vmin))
         low = place.floor().clamp(max=s.num_bins - 2)
@@ -255,7 +267,7 @@ class Agents:
         return hot.scatter(-1, at, 1 - part).scatter(-1, at + 1, part)
 
     def policy(self, flat: Tensor, z: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Mean, a draw and its entropy scaled by the number of actions, as the public code has it."""
+        """The mean action, a random action, and its entropy estimate times the number of actions, as in the public code."""
         s = self.settings
         out = self.nets["policy"](flat, z)
         mean, log_std = out[..., :ACTIONS], out[..., ACTIONS : 2 * ACTIONS]
@@ -266,13 +278,13 @@ class Agents:
 
 
 class Captured:
-    """Work on tensors that stay where they are, as a CUDA graph; plainly done where there is none."""
+    """A function on tensors at fixed addresses, captured as a CUDA graph. Without ``graphs`` it is called directly."""
 
     def __init__(self, work: Callable[[], None], graphs: bool, rounds: int = 3) -> None:
         self.work, self.graph = work, None
         if not graphs:
             return
-        # lets the libraries settle on their kernels before the recording
+        # warm-up: the libraries choose their kernels before the capture
         aside = torch.cuda.Stream()
         aside.wait_stream(torch.cuda.current_stream())
         with torch.cuda.stream(aside):
@@ -292,7 +304,7 @@ class Captured:
 
 
 class Planner:
-    """MPPI in the latent space, for ``lanes`` aircraft of each seed at once."""
+    """Plans actions by MPPI in the latent space, for ``lanes`` aircraft of each seed at once."""
 
     def __init__(self, agents: Agents, lanes: int, explore: bool, graphs: bool, dtype: torch.dtype) -> None:
         self.agents, self.lanes, self.explore, self.dtype = agents, lanes, explore, dtype
@@ -305,7 +317,7 @@ class Planner:
         self.mean.zero_()
 
     def __call__(self, seen: np.ndarray, begun: np.ndarray) -> np.ndarray:
-        """Actions (seeds, lanes, 3); where an episode has begun, nothing is left of the plan before."""
+        """The actions (seeds, lanes, 3) for the observations ``seen``. Where an episode has just begun, the old plan is discarded."""
         self.seen.copy_(torch.from_numpy(seen))
         self.goes_on.copy_(torch.from_numpy(1 - begun.astype(np.float32))[..., None, None])
         self.captured()
@@ -336,7 +348,8 @@ class Planner:
             score = weight[..., None, None]
             mean = (score * elite).sum(2)
             std = (score * (elite - mean.unsqueeze(2)).square()).sum(2).sqrt().clamp(s.min_std, s.max_std)
-        # one of the elites by its weight: the largest weight over exponential noise is a draw
+        # draws an elite with a probability proportional to its weight: the argmax of weight / exponential noise has this
+        # distribution
         chosen = (weight / torch.empty_like(weight).exponential_()).argmax(-1)
         action = elite[:, :, :, 0].gather(2, chosen[..., None, None].expand(-1, -1, 1, ACTIONS)).squeeze(2)
         if self.explore:
@@ -345,7 +358,7 @@ class Planner:
         self.mean.copy_(mean)
 
     def _value(self, flat: dict[str, Tensor], z: Tensor, actions: Tensor) -> Tensor:
-        """What each sequence (seeds, lanes, samples, horizon, 3) is expected to earn."""
+        """The estimated return (seeds, lanes, samples) of each action sequence (seeds, lanes, samples, horizon, 3)."""
         agents, s = self.agents, self.agents.settings
         total, factor, alive = 0.0, 1.0, 1.0
         for t in range(s.horizon):
@@ -360,12 +373,12 @@ class Planner:
 
 
 class Memory:
-    """All transitions of a training, and where a sequence within one episode can start."""
+    """Replay buffer: all transitions of a training, and the steps at which a sequence within one episode can start."""
 
     def __init__(self, agents: Agents, lanes: int, length: int) -> None:
         self.agents, self.lanes, self.length, self.at = agents, lanes, length, 0
         seeds, device = len(agents.seeds), agents.device
-        # observation, the next, action, reward, whether the aircraft was lost
+        # columns: observation, next observation, action, reward, and 1 if the aircraft was lost
         self.rows = torch.zeros(seeds, lanes, length, 2 * OBSERVATIONS + ACTIONS + 2, device=device)
         self.starts = torch.zeros(seeds, lanes * length, dtype=torch.long, device=device)
         self.count = torch.zeros(seeds, 1, dtype=torch.float64, device=device)
@@ -373,7 +386,7 @@ class Memory:
         self.ended: list[np.ndarray] = []
 
     def add(self, rows: np.ndarray, ended: np.ndarray) -> None:
-        """A transition of each lane; (seeds, lanes, columns) and whether the episode ended with it."""
+        """Adds one transition of each lane, (seeds, lanes, columns), and whether its episode ended with it, (seeds, lanes)."""
         self.rows[:, :, self.at] = torch.from_numpy(rows).to(self.rows.device)
         self.ended.append(ended)
         self.at += 1
@@ -388,7 +401,7 @@ class Memory:
         self.count.copy_(torch.from_numpy(self.known[:, None].astype(float)))
 
     def sample(self) -> Tensor:
-        """(seeds, horizon, batch, columns); made of nothing but tensors, so that a graph can hold it."""
+        """A random batch of sequences, (seeds, horizon, batch, columns). It uses tensors only, for the CUDA graph."""
         s, device = self.agents.settings, self.rows.device
         drawn = torch.rand(len(self.known), s.batch_size, dtype=torch.float64, device=device) * self.count
         start = self.starts.gather(1, drawn.long())
@@ -397,7 +410,7 @@ class Memory:
 
 
 class Learner:
-    """One update of all seeds."""
+    """Updates the networks of all seeds."""
 
     def __init__(self, agents: Agents, memory: Memory) -> None:
         self.agents, self.memory, s = agents, memory, agents.settings
@@ -414,7 +427,7 @@ class Learner:
         self.told = torch.zeros(6, len(agents.seeds), device=agents.device)
 
     def update(self) -> None:
-        """Without a look at any number, so that a graph can hold it."""
+        """Makes one update from a random batch. It reads no value on the CPU, so that a CUDA graph can capture it."""
         agents, s, nets, flat = self.agents, self.agents.settings, self.agents.nets, self.agents.flat
         rows = self.memory.sample()
         seen, later, action, reward, lost = rows.split([OBSERVATIONS, OBSERVATIONS, ACTIONS, 1, 1], -1)
@@ -435,7 +448,7 @@ class Learner:
         x = joined(zs[:, :-1], action).flatten(1, 2)
 
         def entropy(logits: Tensor, wanted: Tensor) -> Tensor:
-            """Cross entropy (seeds, horizon), means over the batch."""
+            """The cross entropy over the bins, averaged over the batch: (seeds, …, horizon)."""
             return -(wanted * logits.log_softmax(-1)).sum(-1).mean(-1)
 
         wanted = agents.two_hot(reward)
@@ -455,7 +468,7 @@ class Learner:
             self.told[:5].copy_(torch.stack([loss, consistency, of_reward, of_value, of_end]))
 
     def _improve(self, zs: Tensor) -> None:
-        """The policy, by the value functions as they now are."""
+        """Updates the policy with the present value functions, at the latent states ``zs``."""
         agents, s, flat = self.agents, self.agents.settings, self.agents.flat
         z = zs.flatten(1, 2)
         _, action, entropy = agents.policy(flat["policy"], z)
@@ -477,7 +490,7 @@ class Learner:
         return torch.lerp(ranked[:, low], ranked[:, min(low + 1, ranked.shape[1] - 1)], place - low)
 
     def _step(self, adam: torch.optim.Adam, leaves: list[Tensor], loss: Tensor) -> None:
-        """A step down the losses (seeds), each seed's gradient clipped by its own norm."""
+        """Makes one step of the optimiser for the losses (seeds). The gradient of each seed is clipped by its own norm."""
         seeds = len(loss)
         slopes = torch.autograd.grad(loss.sum(), leaves)
         norm = torch.stack([slope.reshape(seeds, -1).norm(dim=1) for slope in slopes]).norm(dim=0)
@@ -488,7 +501,7 @@ class Learner:
 
 
 def train(asked: argparse.Namespace, settings: Settings, device: torch.device) -> None:
-    """Trains all seeds side by side until ``--steps`` or ``--seconds`` and keeps their weights every ``--round`` steps."""
+    """Trains all seeds at the same time until ``--steps`` or ``--seconds``, and saves their weights every ``--round`` steps."""
     begun_at, seeds, lanes = time.monotonic(), list(range(1, asked.seeds + 1)), asked.lanes
     torch.manual_seed(asked.seeds)
     agents = Agents(settings, seeds, device)
@@ -539,7 +552,7 @@ def train(asked: argparse.Namespace, settings: Settings, device: torch.device) -
         steps += lanes
         if steps < settings.seed_steps:
             continue
-        # the first time as many updates as there are steps, then as many as there were new ones
+        # the first updates are for all transitions so far, the later ones for the new transitions of a step
         owed += asked.updates_per_step * (lanes if update else steps)
         first = update is None
         if first:
@@ -550,7 +563,7 @@ def train(asked: argparse.Namespace, settings: Settings, device: torch.device) -
             update()
             owed, updates = owed - 1, updates + 1
             if updates % 64 == 0 and device.type == "cuda":
-                torch.cuda.synchronize()  # so that the clock above is that of the GPU
+                torch.cuda.synchronize()  # waits for the GPU, so that the time limit includes its work
         if steps // 2000 != mark or first:
             mark = steps // 2000
             told = dict(zip(("loss", "consistency", "reward", "value", "end", "policy"), learner.told.tolist(), strict=True))
@@ -567,31 +580,35 @@ def train(asked: argparse.Namespace, settings: Settings, device: torch.device) -
 
 
 def weights(asked: argparse.Namespace, seed: int) -> Path:
-    """Where a seed's weights are."""
+    """The path of the file with the weights of a seed."""
     return asked.out / f"{AGENT}-{seed}.pt"
 
 
 def plan_dtype(device: torch.device) -> torch.dtype:
-    """What the planner computes in."""
+    """The data type in which the planner computes."""
     return torch.float16 if device.type == "cuda" else torch.float32
 
 
 class Flight:
-    """Aircraft in JSBSim, one for each target, flown from the start to the end of an episode."""
+    """Simulates aircraft in JSBSim, one for each target, for one episode."""
 
     def __init__(self, aircraft: int, threads: int) -> None:
         self.envs = [greylag.X8Env(airspeeds="start") for _ in range(aircraft)]
         self.pool, self.threads = ThreadPoolExecutor(threads), threads
 
     def fly(self, targets: np.ndarray, act: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> dict[str, list]:
-        """Settled error, time to settle and loss for each of (aircraft, 2) targets in degrees, as src/sim/episode.rs has them."""
+        """Flies one aircraft to each target (roll and pitch in degrees, one row each) with the actions of ``act``.
+
+        Returns for each target the settled error in degrees and the settling time in s, as in src/sim/episode.rs, and whether
+        the aircraft left the envelope.
+        """
         count = len(targets)
         seen = np.stack([env.reset()[0] for env in self.envs[:count]]).astype(np.float64)
-        # airspeed counts from 16.67 m/s in an observation; that of the start is wanted
+        # in an observation, airspeed is relative to 16.67 m/s; the commanded airspeed is that of the start
         wanted = np.column_stack([np.radians(targets), seen[:, 2] * OBSERVATION_UNITS[2]])
         alive, away, squares = np.ones(count, bool), np.zeros(count, int), np.zeros((count, 2))
         for step in range(STEPS):
-            # the environment's own target is another
+            # replaces the control errors for the target of the environment by those for `targets`
             seen[:, 13:] = (wanted - seen[:, :3] * OBSERVATION_UNITS[:3]) / OBSERVATION_UNITS[13:]
             action = act(seen.astype(np.float32), np.full(count, step == 0))
 
@@ -615,13 +632,13 @@ class Flight:
 
 
 def rows_of(asked: argparse.Namespace) -> list[tuple[str, float, float]]:
-    """Group, roll and pitch of each target to fly."""
+    """The group, the roll and the pitch in degrees of each target in the groups ``GROUPS``."""
     rows = [line.split(",") for line in asked.targets.read_text().splitlines()[1:]]
     return [(group, float(roll), float(pitch)) for group, roll, pitch in rows if group in GROUPS]
 
 
 def scores(groups: list[str], settled: np.ndarray, settling: np.ndarray, left: np.ndarray) -> dict[str, dict[str, float]]:
-    """As ``judging.judge``, and how many left the envelope of the environment."""
+    """The scores of ``judging.judge``, and the number of aircraft that left the envelope, by group of targets."""
     found = {}
     for name in (*GROUPS, "all"):
         own = np.array([group == name or name == "all" for group in groups])
@@ -635,7 +652,10 @@ def scores(groups: list[str], settled: np.ndarray, settling: np.ndarray, left: n
 
 
 def fly(asked: argparse.Namespace, device: torch.device) -> list[dict]:
-    """Flies what is not yet flown, ``--at-once`` targets of each seed together, and returns the rows of the seeds that are judged."""
+    """Flies the targets that are not in the record, ``--at-once`` targets of each seed at a time.
+
+    Returns one row with the scores of each seed; no rows if targets are still missing.
+    """
     begun_at, targets = time.monotonic(), rows_of(asked)
     seeds = list(range(1, asked.seeds + 1))
     kept = {seed: torch.load(weights(asked, seed), map_location="cpu") for seed in seeds}
@@ -653,7 +673,7 @@ def fly(asked: argparse.Namespace, device: torch.device) -> list[dict]:
     parts = max(1, -(-len(left) // asked.at_once))
     flight, act = None, None
     for part in range(parts if left else 0):
-        # every part has its share of all groups
+        # the stride gives each part targets of all groups
         own = left[part::parts]
         at = time.monotonic()
         if part and at + (at - begun_at) / part > begun_at + asked.judge_seconds:
@@ -684,7 +704,10 @@ def fly(asked: argparse.Namespace, device: torch.device) -> list[dict]:
 
 
 def pilot(agents: Agents, lanes: int, flown_by: str, graphs: bool) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-    """What flies up to ``lanes`` aircraft of each seed."""
+    """A controller for up to ``lanes`` aircraft of each seed: the planner, or the mean of the policy.
+
+    It maps observations, and whether an episode has just begun, to actions.
+    """
     seeds = len(agents.seeds)
     planner = Planner(agents, lanes, False, graphs, plan_dtype(agents.device)) if flown_by == "planner" else None
 
@@ -703,13 +726,13 @@ def pilot(agents: Agents, lanes: int, flown_by: str, graphs: bool) -> Callable[[
 
 
 def check_judge(asked: argparse.Namespace) -> None:
-    """Flies one policy by ``greylag evaluate`` and by the judge here."""
+    """Evaluates one policy with ``greylag evaluate`` and with this script, and prints both scores."""
     targets = rows_of(asked)
     policy = greylag.Policy.load(asked.check_judge)
     flown = Flight(len(targets), asked.threads).fly(np.array([t[1:] for t in targets]), lambda seen, begun: policy.act(seen))
     here = scores([t[0] for t in targets], *(np.array(x) for x in flown.values()))
     with tempfile.TemporaryDirectory() as folder:
-        # because the judge writes into the policy's folder
+        # a copy, because `judge` writes to the policy's folder
         there = judge(Path(shutil.copytree(asked.check_judge, Path(folder) / "policy")), asked)
     for name, score in here.items():
         each = ", ".join(f"{key} {score[key]:.6f} and {there[name][key]:.6f}" for key in there[name] if key != "count")
@@ -717,7 +740,7 @@ def check_judge(asked: argparse.Namespace) -> None:
 
 
 def fusing(device: torch.device) -> bool:
-    """Whether the kernel for planning computes what PyTorch does."""
+    """Tests whether the fused kernel gives the results of PyTorch. Sets ``FUSED`` and returns it."""
     global FUSED
     try:
         x = torch.randn(2, 5, 256, device=device)
@@ -729,14 +752,14 @@ def fusing(device: torch.device) -> bool:
                 FUSED = True
                 if (activated(x, *own, group) - plain).abs().max() > 1e-4:
                     raise ValueError("it computes something else")
-    except Exception as error:  # whatever it is, PyTorch does the same, only slower
+    except Exception as error:  # after any error, PyTorch computes the same more slowly
         print(f"the fused kernel is not used: {type(error).__name__}: {error}", flush=True)
         FUSED = False
     return FUSED
 
 
 def table(rows: list[dict]) -> None:
-    """A row of the table of ``other_agents.py``; its seconds are those of the clock for all seeds together."""
+    """Prints a row of the table of ``other_agents.py``. The seconds are wall time for all seeds together."""
     easy, corners = (statistics.fmean(row["evaluation"][group]["mean_deg"] for row in rows) for group in GROUPS)
     each = ", ".join(f"{row['evaluation']['all']['mean_deg']:.2f}" for row in rows)
     lost = statistics.fmean(row["evaluation"]["all"]["divergence_rate"] for row in rows)
@@ -746,7 +769,7 @@ def table(rows: list[dict]) -> None:
 
 
 def options() -> argparse.Namespace:
-    """What is asked for; settings of the public code can be changed for a try on a small machine."""
+    """The options of the command line. ``--set`` can reduce the settings of the public code for a test on a small machine."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path)
     parser.add_argument("--targets", type=Path, default=Path("params/targets.csv"))
@@ -774,7 +797,7 @@ def options() -> argparse.Namespace:
 
 
 def main() -> None:
-    """Trains, judges, prints."""
+    """Trains the agents, evaluates them in JSBSim and prints the row of the table."""
     asked = options()
     if asked.check_judge is not None:
         check_judge(asked)
@@ -802,7 +825,7 @@ def main() -> None:
         except RuntimeError as error:
             if device.type != "cuda" or asked.eager:
                 raise
-            # a recording that failed leaves CUDA in no state to go on
+            # after a failed capture CUDA is unusable in this process, so the script restarts without graphs
             print(f"CUDA graphs fail, again without: {error}", flush=True)
             os.execv(sys.executable, [sys.executable, *sys.argv, "--eager"])
         with record.open("a") as file:

@@ -1,8 +1,9 @@
-"""Writes a model file with the same relative width on every coefficient.
+"""Writes a copy of a model file in which every coefficient has the same relative standard deviation.
 
     python python/benches/widths.py SHARE MODEL.toml OUT.toml
 
-A coefficient of the value x gets `sd = SHARE |x|` in place of what its file states; one of zero gets none. The airframe file must lie beside OUT.
+A coefficient with the value x gets `sd = SHARE |x|`, which replaces an `sd` in the file. A coefficient that is zero gets no `sd`. The
+airframe file must be in the folder of OUT.toml.
 """
 
 import re

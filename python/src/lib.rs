@@ -14,7 +14,8 @@ use pyo3::prelude::*;
 
 use error::GreylagError;
 
-/// Path of a file that the user names or that is installed with the program, found as the commands find it.
+/// Resolves the path of a file as the commands do: an existing path is returned as given, a path below `params/` may be
+/// that of a shipped file.
 #[pyfunction]
 fn shipped(path: PathBuf) -> PathBuf {
     greylag::commands::shipped::shipped(&path)

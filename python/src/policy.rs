@@ -52,7 +52,7 @@ impl Policy {
         self.agent.actor.network().sizes().to_vec()
     }
 
-    /// The actions of (n, 16) observations, (n, 3).
+    /// The actions, (n, 3), for (n, 16) observations.
     fn act<'py>(
         &self,
         py: Python<'py>,

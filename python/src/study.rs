@@ -101,7 +101,7 @@ fn after_intake<'a>(
     move |stage| progress(Stage { fraction: INTAKE + (1.0 - INTAKE) * stage.fraction, ..stage })
 }
 
-/// A log's format, notes and columns.
+/// Reads a log and returns its name, format, notes and columns.
 #[pyfunction]
 #[expect(clippy::type_complexity, reason = "the Python layer makes a class of it")]
 pub fn load<'py>(
@@ -116,7 +116,7 @@ pub fn load<'py>(
     Ok((log.flight.name.clone(), log.format.name().to_owned(), notes, columns))
 }
 
-/// The JSON document of `greylag compare`.
+/// Compares models over the flights in `logs` and returns the JSON document of `greylag compare`.
 #[pyfunction]
 pub fn compare(
     py: Python<'_>,
@@ -143,7 +143,7 @@ pub fn compare(
     })
 }
 
-/// The JSON document of `greylag diagnose`.
+/// Diagnoses a model from the flights in `logs` and returns the JSON document of `greylag diagnose`.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "the Python layer names them")]
 pub fn diagnose(
@@ -172,7 +172,8 @@ pub fn diagnose(
     })
 }
 
-/// The JSON document of `greylag amend`. Writes the model, the airframe and the document to the folder `out`.
+/// Amends a model, writes the model, the airframe and the JSON document of `greylag amend` to the folder `out`, and
+/// returns the document.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "the Python layer names them")]
 pub fn amend(
@@ -279,7 +280,7 @@ fn write(
     let original = document::Original::read(original).map_err(said)?;
     let files = document::files(&original, model, amended, [logs, hold_out]).map_err(said)?;
     std::fs::create_dir_all(out).map_err(cannot)?;
-    // in the same folder, so that renaming is atomic; it removes itself
+    // the temporary folder is inside `out`, so that renaming is atomic; dropping it removes it
     let part = tempfile::Builder::new().prefix(".part-").tempdir_in(out).map_err(cannot)?;
     let part = part.path();
     for (name, text) in &files {

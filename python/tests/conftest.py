@@ -1,4 +1,4 @@
-"""Flights that several tests read."""
+"""Fixtures: models and simulated flights that several tests use."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ import pytest
 import greylag
 from flights import fly, write_model
 
-#: An effect that the prior lacks, strong enough to be found in a minute and a half.
+#: An effect that the prior lacks. It is large enough to be found in 90 s of flight.
 MISSING = '\n[effects.pitch_break]\nCmalpha3 = { value = -40.0, source = "test" }\n'
 
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Models ``prior.toml`` and ``truth.toml``, flights ``flight-1.csv`` to ``flight-3.csv`` of the second."""
+    """A folder with the models ``prior.toml`` and ``truth.toml``.
+
+    ``flight-1.csv`` to ``flight-3.csv`` are flights that ``truth.toml`` simulates.
+    """
     folder = tmp_path_factory.mktemp("flights")
     write_model(folder, "prior.toml")
     truth = greylag.Model.load(write_model(folder, "truth.toml", MISSING))
@@ -26,6 +29,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def here(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder of models and flights as the working folder."""
+    """The folder with models and flights, as the working directory."""
     monkeypatch.chdir(folder)
     return folder

@@ -1,4 +1,4 @@
-"""Flights of a model that is known, as logs with noisy sensors: truth that shares no code with what is tested but the model."""
+"""Simulates flights of a known model and writes logs with sensor noise. Only the model is code under test."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ import numpy as np
 import greylag
 
 GRAVITY = 9.806
-#: Standard deviations of the noise: angles rad, rates rad/s, airspeed m/s, specific force m/s², velocity m/s.
+#: Standard deviations of the sensor noise: angles in rad, rates in rad/s, airspeed in m/s, specific force in m/s², velocity
+#: in m/s.
 NOISE = {"roll": 1e-3, "pitch": 1e-3, "yaw": 1e-3, "p": 2e-3, "q": 2e-3, "r": 2e-3, "airspeed": 0.05, "alpha": 2e-3, "beta": 2e-3,
          "ax": 0.05, "ay": 0.05, "az": 0.05, "vn": 0.05, "ve": 0.05, "vd": 0.05}
 
 
 def write_model(folder: Path, name: str, effect: str = "") -> Path:
-    """The true prior of the X8 in ``folder``, with one effect more."""
+    """Writes the X8 prior, with the text ``effect`` at its end, to the file ``name`` in ``folder``; returns its path."""
     text = greylag.shipped("params/x8/prior.toml").read_text()
     (folder / "airframe.toml").write_text(greylag.shipped("params/x8/airframe.toml").read_text())
     path = folder / name
@@ -24,7 +25,7 @@ def write_model(folder: Path, name: str, effect: str = "") -> Path:
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """From body axes to north-east-down."""
+    """The rotation matrix from body axes to earth axes (NED) for Euler angles in rad."""
     (sr, sp, sy), (cr, cp, cy) = np.sin([roll, pitch, yaw]), np.cos([roll, pitch, yaw])
     return np.array([
         [cp * cy, sr * sp * cy - cr * sy, cr * sp * cy + sr * sy],
@@ -34,13 +35,13 @@ def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
 
 
 def body_velocity(state: np.ndarray) -> np.ndarray:
-    """u, v, w of a state, m/s."""
+    """The velocity u, v, w of a state in body axes, m/s."""
     _, _, speed, _, _, _, alpha, beta = state
     return speed * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
 
 
 def specific_force(model: greylag.Model, state: np.ndarray, controls: np.ndarray) -> np.ndarray:
-    """What an accelerometer at the centre of gravity reads, m/s²."""
+    """The specific force at the centre of gravity in body axes, as an ideal accelerometer measures it, m/s²."""
     rate, step = model.derivative(state, controls), 1e-5
     slope = (body_velocity(state + step * rate) - body_velocity(state - step * rate)) / (2 * step)
     down = rotation(state[0], state[1], 0.0).T @ [0.0, 0.0, GRAVITY]
@@ -48,7 +49,7 @@ def specific_force(model: greylag.Model, state: np.ndarray, controls: np.ndarray
 
 
 def fly(model: greylag.Model, path: Path, seconds: float, seed: int) -> Path:
-    """Turns, climbs and speeds under an attitude loop with multisines on every control."""
+    """Simulates a flight at random attitude setpoints, with multisines on every control, and writes its log to ``path``."""
     random = np.random.default_rng(seed)
     phases = random.uniform(0, 2 * np.pi, (3, 5))
     state, yaw, altitude = model.start.copy(), 0.0, 600.0

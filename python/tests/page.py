@@ -11,7 +11,7 @@ EXAMPLES: list[str] = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.
 
 
 def run(example: str) -> dict[str, Any]:
-    """Runs an example as it stands; gives its names."""
+    """Runs an example without changes and returns the variables that it defines."""
     names: dict[str, Any] = {"__name__": "example"}
     exec(compile(example, "example", "exec"), names)
     return names

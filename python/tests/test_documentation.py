@@ -1,4 +1,4 @@
-"""The examples of docs/how-to/python.md run as they stand; test_study.py runs the longest and looks at what it finds."""
+"""The examples of docs/how-to/python.md run without changes. test_study.py runs the longest and checks its results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The Gymnasium environments."""
+"""Tests of the Gymnasium environments."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_an_episode_is_truncated_after_ten_seconds_and_the_next_has_the_next_tar
         steps += 1
         assert not lost and -1.1 <= reward <= 0
     assert steps == 1000
-    # the shipped policy settles: half a degree is what its worst targets leave, and more
+    # the shipped policy settles; at its worst targets the remaining error can exceed half a degree
     assert abs(told["roll_left_deg"]) < 2 and abs(told["pitch_left_deg"]) < 2
     seen, told = env.reset()
     second = env.reset(seed=3), env.reset()[1]
@@ -57,19 +57,19 @@ def test_a_lost_aircraft_ends_its_episode_and_earns_the_worst_for_ever():
         assert seen in env.observation_space
         if lost:
             break
-    # (0.5 + 0.5 + 0.1) / (1 - 0.99)
+    # -(0.5 + 0.5 + 0.1) / (1 - 0.99): the smallest reward per step, summed with the discount factor
     assert lost and not over and reward == pytest.approx(-110)
 
 
 def test_both_worlds_are_the_same_where_the_model_is_exact():
     one, other = gym.make(NAMES[0]).unwrapped, gym.make(NAMES[1], model=greylag.EXACT_MODEL).unwrapped
-    # JSBSim computes its start from earth axes: the last bits differ
+    # JSBSim computes the initial state from earth axes, which changes the last bits
     assert np.abs(one.reset(seed=5)[0] - other.reset(seed=5)[0]).max() < 1e-6
     random = np.random.default_rng(2)
     for _ in range(50):
         action = random.uniform(-0.3, 0.3, 3).astype(np.float32)
         there, here = one.step(action), other.step(action)
-        # single precision, added up over half a second
+        # rounding errors of single precision accumulate over half a second
         assert np.abs(there[0] - here[0]).max() < 1e-3 and there[1] == pytest.approx(here[1], abs=1e-4)
 
 
@@ -79,7 +79,7 @@ def test_the_observation_holds_what_is_left_to_the_target():
     assert np.degrees(seen[13] * OBSERVATION_UNITS[13]) == pytest.approx(told["roll_left_deg"])
     assert abs(told["roll_left_deg"]) <= 60 and abs(told["pitch_left_deg"]) <= 30
     assert told["airspeed_left_mps"] == pytest.approx(0, abs=1e-5)
-    # eq. (30): |roll| / 3.3 + |pitch| / 2.25, capped at a half each
+    # eq. (30): |roll error| / 3.3 + |pitch error| / 2.25, each at most 0.5, and |airspeed error| / 48, at most 0.1
     _, reward, *_, told = env.step(np.zeros(3, np.float32))
     roll, pitch = np.radians([told["roll_left_deg"], told["pitch_left_deg"]])
     airspeed = min(abs(told["airspeed_left_mps"]) / 48, 0.1)
@@ -100,7 +100,7 @@ def test_a_vector_begins_anew_in_the_same_step():
     for _ in range(1000):
         seen, reward, lost, over, info = envs.step(actions)
         for i in np.flatnonzero(lost | over):
-            # neutral again, another target; the last state of the old episode is in the info
+            # the new episode starts in the same state with another target; `info` has the last state of the old one
             assert np.array_equal(seen[i, :8], again[i, :8])
             assert info["_final_obs"][i] and not np.array_equal(info["final_obs"][i][:8], seen[i, :8])
         assert np.array_equal(reward == -110, lost)
@@ -113,7 +113,7 @@ def test_a_vector_begins_anew_in_the_same_step():
 def test_a_vector_steps_as_one_aircraft_does():
     envs = greylag.ImaginedVectorEnv(3)
     env = greylag.ImaginedEnv()
-    # the first target of a row is the first aircraft's
+    # the first aircraft gets the first target of the sequence
     seen, _ = envs.reset(seed=9)
     assert np.array_equal(seen[0], env.reset(seed=9)[0])
     for k in range(20):

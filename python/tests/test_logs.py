@@ -1,4 +1,4 @@
-"""MATLAB files of all versions as CSV; objects that only MATLAB reads are named with the line that writes them."""
+"""MATLAB files of all versions are converted to CSV. For an object that only MATLAB reads, the error names an export line."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ FLIGHT = {"t": T, "att": np.column_stack([np.sin(T), 0.1 * np.cos(T), T]), "imu"
 
 
 def mat5(path, **variables):
-    """A file of version 5 or 7."""
+    """Writes a MATLAB file of version 5."""
     scipy_io = pytest.importorskip("scipy.io")
     scipy_io.savemat(path, variables)
     return path
 
 
 def mat73(path, **variables):
-    """A file of version 7.3: HDF5 behind 512 bytes, dimensions from the other end, a class for each variable."""
+    """Writes a MATLAB file of version 7.3: HDF5 after 512 bytes, with reversed dimensions and the class of each variable."""
     h5py = pytest.importorskip("h5py")
 
     def put(group, name, value):
@@ -83,7 +83,7 @@ def test_wrong_names_and_lengths_are_refused(tmp_path):
 
 
 def timetable5(path):
-    """A version 5 file with an object of the class timetable, as MATLAB saves one: a reference to a hidden part."""
+    """Writes a version 5 file with an object of the class timetable. As in MATLAB, it is a reference to a hidden element."""
 
     def element(kind, body):
         return struct.pack("<II", kind, len(body)) + body + b"\0" * (-len(body) % 8)

@@ -1,4 +1,4 @@
-"""Policies from elsewhere, in greylag."""
+"""Tests of the export and import of policies."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ SIZES = [16, 40, 24, 3]
 
 
 def layers(sizes: list[int], seed: int) -> list[tuple[np.ndarray, np.ndarray]]:
-    """A network as PyTorch starts one."""
+    """Random layers of a network, with the initial distribution of PyTorch."""
     random = np.random.default_rng(seed)
     bound = [1 / np.sqrt(n) for n in sizes[:-1]]
     return [(random.uniform(-b, b, (m, n)), random.uniform(-b, b, m)) for n, m, b in zip(sizes, sizes[1:], bound)]
 
 
 def answer(network: list[tuple[np.ndarray, np.ndarray]], seen: np.ndarray) -> np.ndarray:
-    """What the network says, in double precision."""
+    """The outputs of the network, in double precision."""
     for k, (weights, bias) in enumerate(network):
         seen = seen @ weights.T + bias
         seen = np.maximum(seen, 0) if k + 1 < len(network) else np.tanh(seen)
@@ -32,7 +32,7 @@ def answer(network: list[tuple[np.ndarray, np.ndarray]], seen: np.ndarray) -> np
 
 
 def program() -> str | None:
-    """The program `greylag`, built beside."""
+    """The path of the program `greylag`; ``None`` if it is neither built nor installed."""
     built = Path(__file__).parents[2] / "target"
     found = [p for p in (built / "release/greylag", built / "debug/greylag") if p.exists()]
     return os.environ.get("GREYLAG") or shutil.which("greylag") or (str(found[0]) if found else None)
@@ -43,7 +43,7 @@ def test_an_exported_policy_acts_as_its_network(tmp_path):
     folder = greylag.export_policy(tmp_path / "policy", network, trained_in=greylag.LEARNED_MODEL, seed=1, steps=10)
     policy = greylag.Policy.load(folder)
     seen = np.random.default_rng(2).standard_normal((50, 16))
-    # single precision over sums of 40 terms
+    # rounding errors of single precision in sums of 40 terms
     assert np.abs(policy.act(seen) - answer(network, seen)).max() < 1e-5
     assert policy.layers == SIZES and not policy.has_critics
     assert policy.origin["model_sha256"] == greylag.Model.load(greylag.LEARNED_MODEL).sha256
@@ -75,7 +75,7 @@ def test_a_policy_of_another_airframe_is_refused():
 
 @pytest.mark.skipif(program() is None, reason="the program greylag is not built")
 def test_the_program_flies_an_exported_policy(tmp_path):
-    # a policy of greylag's own, through numpy and back: what is flown is known to be good
+    # a shipped policy, which is known to fly well, is read into numpy arrays and exported again
     shipped = greylag.shipped("params/x8/policy")
     network = read(shipped / "actor.safetensors")
     folder = greylag.export_policy(tmp_path / "policy", network, trained_in="jsbsim")
@@ -99,7 +99,7 @@ def test_the_program_flies_an_exported_policy(tmp_path):
 
 
 def read(path: Path) -> list[tuple[np.ndarray, np.ndarray]]:
-    """The layers of a safetensors file, read by hand: greylag stores weights as (inputs, outputs)."""
+    """The layers in a safetensors file. The file has weights (inputs, outputs), the result has (outputs, inputs)."""
     content = path.read_bytes()
     size = int.from_bytes(content[:8], "little")
     header, body = json.loads(content[8 : 8 + size]), content[8 + size :]

@@ -1,4 +1,4 @@
-"""Logs: read, compared, diagnosed, amended."""
+"""Tests of the functions on flight logs: load, compare, diagnose and amend."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_a_comparison_shows_the_better_model(here):
     frame = found.frame()
     assert list(frame["horizon_s"]) == [1, 2, 5, 10] * (2 + len(found.forecasts))
     prior, truth, *forecasts = frame[frame["horizon_s"] == 1]["rmse_scaled"]
-    # the prior lacks an effect: at least twice the error of the model that flew
+    # the prior lacks an effect; its error is more than twice that of the model that simulated the flights
     assert prior > 2 * truth and min(forecasts) > truth
     assert found.channels_frame()["unexplained_fraction"].between(-1, 2).any()
     assert found.sentences and found.document["schema"] == "greylag.comparison/1"
@@ -59,7 +59,7 @@ def test_the_missing_effect_is_found_and_added(here):
     assert "pitch_break" in amended.model.effects
     judged = {row["model"]: row["rmse_scaled"] for _, row in amended.frame().query("horizon_s == 1").iterrows()}
     assert judged["amended"] < 0.7 * judged["given"]
-    # the truth is -40
+    # the true value is -40
     value = amended.parameters_frame().set_index("name").loc["pitch_break.Cmalpha3", "value"]
     assert value == pytest.approx(-40, rel=0.2)
     with pytest.raises(FileExistsError, match="replace=True"):
@@ -93,7 +93,7 @@ def test_progress_that_raises_ends_the_work(here):
 
 
 def test_an_interrupt_ends_the_work_and_other_threads_go_on_meanwhile(here):
-    # a shell without a terminal starts what runs in its background with the interrupt ignored
+    # a shell without a terminal starts background processes with SIGINT ignored
     signal.signal(signal.SIGINT, signal.default_int_handler)
     turns, over = [], threading.Event()
 
@@ -111,5 +111,6 @@ def test_an_interrupt_ends_the_work_and_other_threads_go_on_meanwhile(here):
     with pytest.raises(KeyboardInterrupt):
         greylag.diagnose("prior.toml", LOGS, nulls=2000)
     over.set()
-    # 2000 nulls take minutes; half of the turns of half a second are proof enough on a busy machine
+    # without the interrupt, 2000 nulls take minutes; the counting thread has 50 turns in 0.5 s, and half of them
+    # suffice on a busy machine
     assert time.monotonic() - begun < 30 and len(turns) > 25

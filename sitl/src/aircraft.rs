@@ -73,7 +73,7 @@ pub enum AircraftError {
     Hidden(#[from] HiddenError),
 }
 
-/// Files of a JSBSim tree; those in memory take precedence over those on disk.
+/// Files of a JSBSim tree; files in memory take precedence over files on disk.
 struct Tree {
     disk: Option<FileResolver>,
     memory: MemoryResolver,
@@ -123,8 +123,8 @@ pub(crate) fn load(
         .map_err(|source| AircraftError::Load { name: name.to_owned(), source })
 }
 
-/// The document with an added system that declares the `held` properties. Without it, an aircraft that reads a property of
-/// another program does not load.
+/// The document with an added system that declares the `held` properties. Without this system, an aircraft that reads a
+/// property that only another program defines does not load.
 fn declared(document: &str, held: &[(String, f64)]) -> String {
     let end = document.rfind("</fdm_config>").filter(|_| !held.is_empty());
     let Some(end) = end else { return document.to_owned() };

@@ -161,13 +161,13 @@ impl ArdupilotArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Start", allow_negative_numbers = true)]
 struct StartArgs {
-    /// Right wing down is positive.
+    /// Roll angle at the start; right wing down is positive.
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     start_roll_deg: f64,
-    /// Nose up is positive.
+    /// Pitch angle at the start; nose up is positive.
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     start_pitch_deg: f64,
-    /// From true north towards east.
+    /// Yaw angle at the start, from true north towards east.
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     start_yaw_deg: f64,
     /// Angle of attack at the start.
@@ -176,7 +176,7 @@ struct StartArgs {
     /// True airspeed at the start.
     #[arg(long, value_name = "MPS", default_value_t = Start::NEUTRAL.airspeed_mps)]
     start_airspeed_mps: f64,
-    /// Above mean sea level.
+    /// Altitude above mean sea level at the start.
     #[arg(long, value_name = "M", default_value_t = Start::NEUTRAL.altitude_m)]
     start_altitude_m: f64,
 }
@@ -228,7 +228,7 @@ impl Cli {
     }
 }
 
-/// Simulated parameters by name and value, and the names of those that the flight stack does not simulate.
+/// Name and value of each simulated parameter, and the names of the parameters that the flight stack does not simulate.
 type Played = (Vec<(String, f64)>, Vec<String>);
 
 /// Reads a parameter file and separates the parameters that `personality` simulates from the others.

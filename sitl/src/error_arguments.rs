@@ -10,7 +10,7 @@ use crate::shim::{Bias, FrameFaults, Noise};
 enum Preset {
     /// Sensors without noise.
     None,
-    /// The order of a small autopilot with its motor running.
+    /// Typical noise of a small autopilot with the motor running.
     Realistic,
 }
 
@@ -69,13 +69,13 @@ pub struct FaultArgs {
     /// A state frame is lost with this probability.
     #[arg(long, value_name = "0..1", default_value_t = 0.0)]
     drop: f64,
-    /// Each state frame comes late by a further uniform 0..MS of wall time.
+    /// Additional delay of each state frame, uniform in 0..MS of wall time.
     #[arg(long, value_name = "MS", default_value_t = 0.0)]
     jitter_ms: f64,
     /// A state frame comes late by --late-ms with this probability.
     #[arg(long, value_name = "0..1", default_value_t = 0.0)]
     late: f64,
-    /// How late such a frame is, in wall time.
+    /// Delay of the frames that --late selects, in wall time.
     #[arg(long, value_name = "MS", default_value_t = 30.0)]
     late_ms: f64,
 }

@@ -82,7 +82,7 @@ pub enum FilterKind {
 }
 
 impl Filter {
-    /// Placeholder in an expression for the output property of the filter at index `place`, from 0, of the effect's list.
+    /// Placeholder that stands in an expression for the output of the effect's filter with the index `place`, from 0.
     pub fn placeholder(place: usize) -> String {
         format!("{{filter-{place}}}")
     }

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Regenerates shim_vectors.txt: MAVLink frames made by pymavlink, which the shim's codec must make too.
+"""Regenerates shim_vectors.txt: MAVLink frames of pymavlink, which the shim's codec must reproduce.
 
     python3 -m venv venv && venv/bin/pip install pymavlink==2.4.50
     venv/bin/python sitl/tests/shim_vectors.py > sitl/tests/shim_vectors.txt
@@ -17,7 +17,7 @@ from pymavlink.dialects.v20 import development as newer  # noqa: E402
 
 
 def messages(m):
-    """One message of each kind; fractions are exact in binary, so that both sides mean the same."""
+    """One message of each kind. Fractions are exact in binary, so both codecs have equal values."""
     ramp16 = [0.25, -0.5, 0.75] + [0.0] * 13
     ramp32 = [0.125 * i - 1.0 for i in range(32)]
     return [
@@ -71,7 +71,7 @@ def messages(m):
 
 
 def later(m):
-    """What only newer dialects have."""
+    """The messages that only newer dialects define."""
     return [
         ("available_modes", m.MAVLink_available_modes_message(4, 2, 5, 0x05040000, 0, b"Return")),
     ]
@@ -87,7 +87,7 @@ def main():
     for name, message in later(newer):
         print(name, message.pack(link).hex())
 
-    # What a companion that speaks MAVLink 1 sends.
+    # The answer of a companion that uses MAVLink 1.
     old = one.MAVLink(None, srcSystem=1, srcComponent=1)
     old.seq = 42
     controls = [0.25, -0.5, 0.75] + [0.0] * 13

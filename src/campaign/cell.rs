@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-/// Placeholder of the campaign's folder in a cell's command line and in recorded commands.
+/// Placeholder for the campaign's folder in a cell's command line and in recorded commands.
 pub const OUT: &str = "$OUT";
 /// Number of hexadecimal digits of the identity in a folder name.
 const SHORT: usize = 12;
@@ -34,7 +34,8 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// Name of the cell's folder. It contains the start of the identity: another command or input gives another folder.
+    /// Name of the cell's folder. It contains the start of the identity. A cell with another command or input therefore has
+    /// another folder.
     pub fn folder(&self) -> String {
         format!("{}-{}", self.stem(), &self.identity[..SHORT.min(self.identity.len())])
     }

@@ -18,9 +18,9 @@ pub struct Gathered {
     pub failed: Vec<(String, Failure)>,
     /// Ids of the cells that have started and have no result.
     pub begun: Vec<String>,
-    /// Cells whose only result is of another command or of other inputs.
+    /// Ids of the cells that only have a result of another command or of other inputs.
     pub stale: Vec<String>,
-    /// Cells that have not started.
+    /// Ids of the cells that have not started.
     pub missing: Vec<String>,
 }
 
@@ -29,9 +29,9 @@ pub struct Gathered {
 pub struct Joined {
     /// Number of imported results.
     pub taken: usize,
-    /// Number of results of cells that already have a result with equal measurements.
+    /// Number of results that were not imported because their cells already have a result with equal measurements.
     pub twice: usize,
-    /// Cells that already have a result with different measurements.
+    /// Ids of the cells that already have a result with different measurements.
     pub differing: Vec<String>,
     /// Number of results that belong to no cell of the plan, or to another command or input.
     pub foreign: usize,
@@ -66,10 +66,10 @@ impl Gathered {
         Ok(())
     }
 
-    /// Imports the results `others`, for instance from another machine, for the cells of `plan` without a result here.
+    /// Imports the results `others`, for instance those of another machine. They are used for the cells of `plan` that have
+    /// no local result.
     ///
-    /// Results of another command or input are not imported. If a cell has a local and an imported result, the local
-    /// result is kept.
+    /// Results of another command or input are not imported. If a cell has a local result too, the local result is kept.
     pub fn join(&mut self, plan: &Plan, others: Vec<Record>) -> Joined {
         let mut joined = Joined::default();
         for other in others {
@@ -223,7 +223,7 @@ mod tests {
         assert_eq!((summary.rows.len(), summary.rows[0].ours.mean.value), (1, 12.0));
         let found = &findings(&planned_first.file, &all.records).unwrap()[0];
         assert_eq!(found.outcome, Outcome::Holds, "{}", found.because);
-        // six cells of one seed tell nothing of the others
+        // six cells of one seed do not show the spread over seeds
         let mut one = all.records.clone();
         one.iter_mut().for_each(|record| record.seed = Some(1));
         let found = &findings(&planned_first.file, &one).unwrap()[0];
@@ -232,7 +232,7 @@ mod tests {
         assert_eq!(found.outcome, Outcome::NoData);
         assert_eq!(found.because, "no cell of last kind=y has easy.mean_deg");
 
-        // results from another machine for cells that are not finished here
+        // results of another machine for cells without a local result
         let (mut partly, mut elsewhere) = (all.clone(), all.records.clone());
         // an inexact decimal parser would change the last bit of this value
         elsewhere[1].metrics.insert("easy.mean_deg".to_owned(), 0.001_848_630_997_957_734_2);

@@ -18,8 +18,8 @@ const CURVE: &str = "curve.csv";
 const COLUMNS: [&str; 5] = ["steps", "easy_deg", "hard_deg", "divergence_rate", "reward"];
 /// Suffixes of the files that later cells read.
 const READ_LATER: [&str; 3] = ["safetensors", "toml", "csv"];
-/// Files that are not hashed. The learning curve contains computing times. Only the same cell resumes from the
-/// checkpoint.
+/// Files that are not hashed. The learning curve contains computing times, which differ between runs. The checkpoint is
+/// read only by the same cell.
 const OWN: [&str; 2] = ["checkpoint.safetensors", CURVE];
 
 /// Output of a cell.
@@ -81,8 +81,8 @@ fn evaluated(document: &Value) -> Vec<(String, f64)> {
     all
 }
 
-/// Quality measures over the targets of a group. `easy.surface_travel` is the median over the targets,
-/// `easy.load_factor_max.worst` the worst value.
+/// Quality measures over the targets of a group, with their names. For example, `easy.surface_travel` is the median over the
+/// targets, and `easy.load_factor_max.worst` is the worst value.
 fn measured(measures: &Value, before: &str) -> Vec<(String, f64)> {
     let mut all = Vec::new();
     for (id, spread) in measures.as_object().into_iter().flatten() {
@@ -93,8 +93,8 @@ fn measured(measures: &Value, before: &str) -> Vec<(String, f64)> {
     all
 }
 
-/// Free-run errors of the learned model and of its prior on test flights, after each number of steps. The median
-/// relative error of the coefficients is included if their true values are known.
+/// Errors of open-loop simulations with the learned model and with its prior on test flights, for each simulated number of
+/// steps. The median relative error of the coefficients is included if their true values are known.
 fn trained(document: &Value) -> Vec<(String, f64)> {
     let mut all = Vec::new();
     for (who, before) in [("learned", ""), ("prior", "prior.")] {

@@ -9,7 +9,7 @@ use super::file::{CampaignFile, Level, StageFile, levels};
 use greylag_model::GreyBox;
 use greylag_model::residual::hash;
 
-/// Placeholder of the cell's output folder in a stage's command.
+/// Placeholder for the cell's output folder in a stage's command.
 const OWN: &str = "{out}";
 
 /// A campaign with its cells.
@@ -57,8 +57,8 @@ pub fn plan(
     Ok(Plan { file, cells })
 }
 
-/// Checks that no cell of the stage with another seed has the command and the inputs of `new`: copies of one result would count
-/// as several seeds. Levels with other names may have the same command.
+/// Checks that no cell of the same stage with another seed has the command and the inputs of `new`. Otherwise copies of one
+/// result would count as several seeds. Cells that differ only in other levels may have the same command.
 fn distinct(cells: &[Cell], new: &Cell) -> Result<(), String> {
     let same = |cell: &&Cell| {
         cell.stage == new.stage
@@ -213,8 +213,8 @@ fn cell(
     cell
 }
 
-/// Input files of a command: its words with a slash, except folders of the campaign, and the additional inputs of its
-/// stage.
+/// Input files of a command: its words that contain a slash, except folders of the campaign, and the additional inputs of
+/// its stage.
 fn named_files(words: &[String], stage: &StageFile) -> Vec<String> {
     let named = words.iter().filter(|w| w.contains('/') && !w.contains(OUT) && !w.contains(OWN));
     // in `--env model:FOLDER` the path follows the colon

@@ -36,8 +36,8 @@ pub fn tables() -> Vec<&'static str> {
 }
 
 /// Published median, interquartile mean and mean of the quantity `metric` in one row of a table; `None` for a statistic
-/// that is not published. `easy.mean_deg` and the like are in degrees. `easy.divergence_rate` and the like are
-/// fractions, of which only the mean is published.
+/// that is not published. Quantities such as `easy.mean_deg` are in degrees. Quantities such as `easy.divergence_rate` are
+/// fractions, and only their mean is published.
 pub fn published(table: &str, row: &str, metric: &str) -> [Option<Estimate>; 3] {
     let (targets, quantity) = metric.rsplit_once('.').unwrap_or(("", metric));
     let find = |statistic: &str| {

@@ -37,7 +37,7 @@ pub struct Aggregate {
     pub max: f64,
 }
 
-/// Summarises all runs. `strata` holds one vector for each task, with one score for each seed. `None` without runs.
+/// Summarises all runs. `strata` has one vector for each task, with one score for each seed. `None` if there are no runs.
 pub fn aggregate(strata: &[Vec<f64>]) -> Option<Aggregate> {
     let runs: Vec<f64> = strata.concat();
     let estimate = |statistic: &dyn Fn(&[f64]) -> f64| Estimate {
@@ -65,8 +65,8 @@ pub fn difference(a: &[f64], b: &[f64]) -> Option<Estimate> {
     Some(Estimate { value: gap(&strata.concat()), ci95 })
 }
 
-/// Mean of paired differences. `strata` holds the differences of each stratum, which is resampled separately. `None`
-/// without pairs.
+/// Mean of paired differences. `strata` has the differences of each stratum. The strata are resampled separately. `None` if
+/// there are no pairs.
 pub fn paired_difference(strata: &[Vec<f64>]) -> Option<Estimate> {
     let gaps = strata.concat();
     if gaps.is_empty() {

@@ -1,4 +1,4 @@
-//! A campaign on disk: one folder per cell with one result, which is written atomically.
+//! A campaign on disk: each cell has a folder with one result, which is written atomically.
 
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ const RESULT: &str = "result.json";
 const FAILURE: &str = "failure.json";
 /// File with a cell's computing time.
 const TIMES: &str = "times.json";
-/// Lock file, which is locked while the cell runs.
+/// File on which the process that runs the cell holds a lock.
 const LOCK: &str = "lock";
 /// File that marks a started cell.
 const BEGUN: &str = "begun";

@@ -143,8 +143,8 @@ fn row(
     Some(SummaryRow { name, metric: metric.into(), ours, runs, paper })
 }
 
-/// Least number of seeds for which an interval over seeds is used. The runs of one seed have no spread over seeds, however
-/// many they are.
+/// Smallest number of seeds for which an interval over seeds is used. Even many runs of one seed do not show the spread over
+/// seeds.
 const FEWEST: usize = 3;
 
 impl Summary {
@@ -275,7 +275,7 @@ mod tests {
         [("prior", prior.to_owned()), (SEED, seed.to_string())].map(|(a, l)| (a.into(), l)).into()
     }
 
-    /// Three cells of one seed differ by prior, not by chance.
+    /// Three cells of two seeds are not enough, three cells of three seeds are.
     #[test]
     fn many_cells_of_few_seeds_do_not_depart_from_the_paper() {
         let run = |k: u64, seed: u64| Run { cell: k.to_string(), seed: Some(seed), value: 1.0 };
@@ -290,7 +290,7 @@ mod tests {
         assert!(row([1, 2, 3]).departure().is_some());
     }
 
-    /// Seeds differ by 10 and the two sides by 1. Only the paired test can detect the difference.
+    /// The values of the seeds differ by 10, those of the two sides by 1. Only the paired test can detect the latter.
     #[test]
     fn cells_of_one_seed_are_compared_with_each_other() {
         let side = |more: f64| -> Vec<(Levels, f64)> {

@@ -28,16 +28,16 @@ enum Command {
     /// Check a model's aircraft in flight: trim, modes, authority of the surfaces, margins of the
     /// LQI.
     Check(check::Arguments),
-    /// Draw aircraft from a distribution: how they fly, whether the shipped ones lie among them; their files.
+    /// Draw aircraft from a distribution, print how they fly and whether the shipped ones lie among them, and write their files.
     Draw(draw::Arguments),
     /// Write a model as an aircraft of another program.
     Export(export::Arguments),
-    /// Fit an aircraft of known mass, span and area to a flight: its model, its page, what to fly next.
+    /// Fit a model of an aircraft of known mass, span and area to flights, write its page, and recommend what to fly next.
     #[cfg(feature = "study")]
     FromLog(from_log::Arguments),
-    /// Make airframe and model of another program's aircraft.
+    /// Make airframe and model from an aircraft of another program.
     Import(import::Arguments),
-    /// Write airframe and model from mass, span, area and tail: textbook estimates with their widths.
+    /// Write airframe and model from mass, span, area and tail: textbook estimates with standard deviations.
     New(new::Arguments),
 }
 

@@ -28,19 +28,19 @@ pub struct Arguments {
     /// Folder of the exploration; a round goes into a folder `round-NN` below it.
     #[arg(long)]
     out: PathBuf,
-    /// The round: 0 is random or flown by --controller, later ones are planned with CEM-MPC through `--model`, half, a
-    /// quarter and so on of their actions still random.
+    /// Number of the round: round 0 is random or flown by --controller, later rounds are planned by CEM-MPC with `--model`;
+    /// half of the actions of round 1 are random, a quarter of those of round 2, and so on.
     #[arg(long, default_value_t = 0)]
     round: u32,
-    /// Episodes of 1000 steps; 175 in round 0, else 25, as in the paper.
+    /// Number of episodes of 1000 steps [default: 175 in round 0, else 25, as in the paper].
     #[arg(long)]
     episodes: Option<u32>,
     /// Model to plan with, the last one trained; with --controller a model of the aircraft, from which its cruise airspeed
     /// and rudder are taken.
     #[arg(long)]
     model: Option<PathBuf>,
-    /// Controller that flies round 0 towards random attitudes, half of the actions still random: `any` or `adaptive`, which
-    /// need no model of the aircraft's dynamics. Without it all actions of round 0 are random.
+    /// Controller that flies round 0 towards random attitudes, with half of the actions random: `any` or `adaptive`, which
+    /// need no model of the aircraft's dynamics. Without a controller all actions of round 0 are random.
     #[arg(long, value_name = "NAME", requires = "model")]
     controller: Option<Explorer>,
     /// Seed of targets and actions.
@@ -137,7 +137,7 @@ pub fn fly(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     Ok(Ended::Done)
 }
 
-/// Writes the file of an episode completely or not at all. An episode with a file need not be flown again.
+/// Writes the file of an episode completely or not at all. An episode that has a file is therefore not flown again.
 fn save(flight: &crate::logs::Flight, path: &Path) -> Result<()> {
     let part = path.with_extension("part");
     let _ = std::fs::remove_file(&part);
@@ -145,8 +145,8 @@ fn save(flight: &crate::logs::Flight, path: &Path) -> Result<()> {
     std::fs::rename(&part, path).with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// The options that the episodes of a round share, one a line. The model is left out: its path may be written in another
-/// way.
+/// The options that the episodes of a round share, one per line. The model is omitted, because its path can be written in
+/// several ways.
 fn shared_options(arguments: &Arguments, plant: &PlantOptions) -> String {
     let hidden: Vec<String> = plant.hidden.iter().map(ToString::to_string).collect();
     format!(

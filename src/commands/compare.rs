@@ -56,10 +56,10 @@ pub struct Arguments {
     #[arg(long)]
     report: Option<PathBuf>,
     /// Write every free run as CSV: model, flight, start, horizon, each state predicted and measured, and the 95 % interval
-    /// of the prediction by the errors of the other runs.
+    /// of the prediction from the errors of the other runs.
     #[arg(long, value_name = "CSV")]
     predictions: Option<PathBuf>,
-    /// Take the deflections at the log's own times for them, as `diagnose`, `amend` and the
+    /// Use the deflections at the times that the log states for them, as `diagnose`, `amend` and the
     /// workbench do; without this option, a delay of the log's actuator clock is corrected if it is
     /// certain.
     #[arg(long)]
@@ -199,8 +199,8 @@ fn baselines(comparison: &Comparison) -> Option<String> {
     (!all.is_empty()).then_some(said)
 }
 
-/// Free-run errors in the units of each state. If a model's file has constants of the flights (trims, sensor errors),
-/// the table also has the errors without these constants.
+/// Errors of free runs (open-loop simulations) in the units of each state. If a model's file has constants of the flights
+/// (trims, sensor errors), the table also has the errors without these constants.
 fn free_run_table(comparison: &Comparison) -> Table {
     let header = [
         "", "s", "NRMSE", "lost", "roll °", "pitch °", "V m/s", "p °/s", "q °/s", "r °/s", "α °",

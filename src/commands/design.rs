@@ -75,7 +75,7 @@ fn document<'a>(
     }
 }
 
-/// Simulates each manoeuvre with either effect, prints the separations, and writes the best schedule.
+/// Simulates each manoeuvre with each of the two effects, prints the separations, and writes the best schedule.
 ///
 /// # Errors
 /// If the model, an effect or the file cannot be used, or no manoeuvre distinguishes the two effects.

@@ -1,4 +1,4 @@
-//! `greylag diagnose`: which physical effect a model lacks.
+//! `greylag diagnose`: finds the physical effects that a model lacks.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -51,13 +51,13 @@ pub struct Arguments {
     /// Bootstrap draws under the null hypothesis (no effect missing) that set the thresholds.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(20..))]
     nulls: u16,
-    /// Seed of everything that is drawn.
+    /// Seed of all random draws.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Effect files (TOML) or folders of them, tried as candidates in addition to the catalogue.
     #[arg(long = "effect", value_name = "FILE", num_args = 1..)]
     effects: Vec<String>,
-    /// Ids to be left out of the catalogue.
+    /// Ids of effects of the catalogue that are not tried.
     #[arg(long, num_args = 1..)]
     without: Vec<String>,
     #[command(flatten)]
@@ -67,7 +67,7 @@ pub struct Arguments {
     force: bool,
 }
 
-/// Reads, reconstructs, diagnoses; prints sentences and table; writes JSON and report.
+/// Reads and reconstructs the flights and diagnoses the model. Prints sentences and tables, and writes JSON and report.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
     for path in arguments.json.iter().chain(&arguments.report) {
@@ -98,7 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let words = file_words(&arguments.effects)?;
     let next = next(arguments, &diagnosis, &words, answer.numbers.change_percent);
     let answer = answer.then(next);
-    // drawn before anything is written, so that Ctrl-C leaves nothing behind
+    // the page is drawn before anything is written, so that Ctrl-C leaves no file behind
     let drawn = arguments.report.as_ref().map(|path| {
         let mut models = [tuned, model.clone()];
         models[1].name = "as given".into();
@@ -138,8 +138,8 @@ struct Document<'a> {
 /// Smallest reduction of the error by tuning for which a tuning command is recommended, %.
 const WORTH_TUNING: f64 = 1.0;
 
-/// The command that comes next. `words` name effects of files. `change_percent` is the change of the error by tuning and
-/// effects, %.
+/// The command to run next. `words` has the paths of effect files by the ids of their effects. `change_percent` is the change
+/// of the error by tuning and effects, %.
 fn next(
     arguments: &Arguments,
     diagnosis: &Diagnosis,
@@ -183,7 +183,7 @@ fn turned(model: &str, logs: &str, out: &str) -> String {
     format!("greylag amend --model {model}{logs} --tune-only --axes-askew 3 --out {out}")
 }
 
-/// Whether an asserted effect could be another one as well.
+/// Whether the flights do not distinguish an asserted effect from another explanation.
 fn in_doubt(diagnosis: &Diagnosis) -> bool {
     alike(diagnosis).next().is_some()
 }
@@ -193,7 +193,7 @@ fn alike(diagnosis: &Diagnosis) -> impl Iterator<Item = &String> {
     diagnosis.effects.iter().filter(|c| c.asserted).flat_map(|c| &c.indistinguishable_from)
 }
 
-/// Whether misaligned axes are all that `alike` names.
+/// Whether `alike` names misaligned axes and nothing else.
 fn only_axes<'a>(alike: impl Iterator<Item = &'a String>) -> bool {
     let mut alike = alike.peekable();
     alike.peek().is_some() && alike.all(|id| id == askew::ID)
@@ -294,7 +294,7 @@ fn channels(diagnosis: &Diagnosis) -> Table {
     table
 }
 
-/// A share in percent; a dash for an unknown share.
+/// Formats the fraction `x` in percent; a dash if `x` is not finite.
 fn share(x: f64) -> String {
     if x.is_finite() { format!("{:.3} %", 100.0 * x) } else { "–".into() }
 }
@@ -324,7 +324,7 @@ fn clear(asserted: bool) -> String {
     if asserted { "yes" } else { "" }.into()
 }
 
-/// Three significant figures; a dash for an unknown value.
+/// Formats `x` with three significant figures; a dash if `x` is not finite.
 fn number(x: f64) -> String {
     match x {
         x if !x.is_finite() => "–".into(),

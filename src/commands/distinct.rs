@@ -1,4 +1,4 @@
-//! Refuses two logs of the same flight. A fit would count the flight twice, or be validated on its own data.
+//! Checks that no flight is given twice. A fit would otherwise count it twice, or be validated on its own data.
 
 use std::path::{Path, PathBuf};
 
@@ -6,8 +6,8 @@ use anyhow::{Result, bail};
 
 use crate::model::residual::hash;
 
-/// Refuses a flight that occurs twice in `fitted`, twice in `held`, or in both. Files are compared by content,
-/// because one file can have several paths and copies.
+/// Checks that no flight occurs twice in `fitted`, twice in `held`, or in both. Files are compared by content, because one
+/// file can have several paths and copies.
 ///
 /// # Errors
 /// If two files have the same content. The error names both. A file that cannot be read is skipped, because the command
@@ -36,8 +36,8 @@ pub fn distinct(fitted: &[PathBuf], held: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-/// Refuses two of `logs` that have the same file name, for constants of each flight: the model's file keeps them by the names of
-/// the logs, so one flight would have those of the other.
+/// Checks that no two of `logs` have the same file name. This is required if each flight has constants of its own, because
+/// the model file stores them under the file name of the log.
 ///
 /// # Errors
 /// If two logs have the same file name. The error names both.

@@ -10,7 +10,7 @@ use crate::logs::quoted;
 use crate::physics::effects::Kind;
 use crate::physics::formula::register;
 
-/// The ids of `effects`, each of which is an id, an effect file or a folder of effect files. The files are read.
+/// The ids of `effects`. Each entry is an id, an effect file or a folder of effect files. The files are read.
 ///
 /// # Errors
 /// If a file cannot be read or is no effect file.
@@ -31,7 +31,7 @@ pub fn named_effects(effects: &[String]) -> Result<Vec<String>> {
     Ok(ids)
 }
 
-/// The words by which a command line names the effects of files among `effects`, by id: the file's path, quoted.
+/// For each effect of an effect file among `effects`: its id, and the quoted path of its file for a command line.
 ///
 /// # Errors
 /// If a file cannot be read or is no effect file.
@@ -52,7 +52,7 @@ pub fn file_words(effects: &[String]) -> Result<BTreeMap<String, String>> {
     Ok(words)
 }
 
-/// The effect files in `folder`, which the user named `named`.
+/// Paths of the effect files in `folder`. They begin with `named`, the path of the folder as the user wrote it.
 fn folder_files(named: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder)? {

@@ -29,11 +29,11 @@ pub struct Arguments {
 
 #[derive(clap::Subcommand)]
 enum What {
-    /// Every effect in a line.
+    /// List all effects, one per line.
     List(JsonArgument),
-    /// All that is known of one effect, of the catalogue or of a file; with --report, its signature drawn.
+    /// Describe one effect of the catalogue or of a file in full; with --report, draw its signature.
     Show(Show),
-    /// The variables and functions of formulas in effect files.
+    /// List the variables and functions of formulas in effect files.
     Variables,
 }
 
@@ -45,7 +45,7 @@ struct Show {
     /// Write the effect's page, one HTML file with its signature.
     #[arg(long)]
     report: Option<PathBuf>,
-    /// The model that the signature is drawn on.
+    /// Model for which the signature is computed.
     #[arg(long, default_value = "params/x8/jsbsim.toml")]
     model: PathBuf,
     /// Replace the files if they exist.
@@ -101,7 +101,7 @@ struct Listed {
     effects: Vec<Document>,
 }
 
-/// What an effect acts on, in the order of the list.
+/// What an effect acts on. The list of effects has the order of these variants.
 #[derive(Clone, Copy, PartialEq)]
 enum Place {
     Forces,
@@ -194,7 +194,7 @@ fn channels(place: Place, about: &Description) -> String {
     }
 }
 
-/// The variables and functions that a formula may name.
+/// Text with the variables and functions that a formula may contain.
 fn variables() -> String {
     let mut text = String::from("variables\n");
     for v in Variable::ALL {
@@ -246,7 +246,7 @@ fn written(effect: &Written) {
 fn show(show: &Show) -> Result<()> {
     let (place, about) = named(&show.id)?;
     let overwrite = show.force.into();
-    // both are checked first: with one of them written, the same command would be refused again
+    // both files are checked first: if only one were written, the corrected command would be refused because of it
     show.json.writable(overwrite)?;
     if let Some(path) = &show.report {
         files::writable(path, overwrite)?;

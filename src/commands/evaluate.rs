@@ -48,8 +48,8 @@ const IN_JSBSIM: [&str; 11] = [
     "start_altitude_m",
 ];
 
-/// Options that do not apply to drawn aircraft. They fly random attitudes, with controllers that are designed from their
-/// own models and have no envelope limiter.
+/// Options that do not apply to drawn aircraft. Drawn aircraft fly random attitudes, with controllers that are designed for
+/// each aircraft and have no envelope limiter.
 const UNUSED_BY_ANY: [&str; 11] = [
     "draws",
     "steps",
@@ -82,10 +82,10 @@ pub struct Arguments {
     /// File of the targets to fly.
     #[arg(long, default_value = "params/targets.csv")]
     targets: PathBuf,
-    /// Only these groups of targets.
+    /// Fly only these groups of targets.
     #[arg(long = "group", num_args = 1.., value_parser = choices::group())]
     groups: Vec<Group>,
-    /// Only the Nth of every N targets.
+    /// Fly only one target in N.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     every: u32,
     /// Also fly this number of steps between random attitudes of the envelope: the first attitude
@@ -93,28 +93,28 @@ pub struct Arguments {
     /// same --seed draws the same steps.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=10_000))]
     steps: u32,
-    /// Fly the steps alone.
+    /// Fly only the steps, and no targets.
     #[arg(long, requires = "steps", conflicts_with_all = ["targets", "groups", "every"])]
     no_targets: bool,
     /// Fly targets beyond the bank and pitch of the airframe's envelope too.
     #[arg(long)]
     beyond_envelope: bool,
-    /// Fly this number of models drawn from the widths of the first --model's coefficients in place
-    /// of JSBSim: Monte Carlo over the uncertainty of the aircraft. The controllers keep the
-    /// --model that they are built from.
+    /// In place of JSBSim, fly this number of models whose coefficients are drawn from the prior
+    /// distributions of the first --model: Monte Carlo over the uncertainty of the aircraft. The
+    /// controllers keep the --model that they are built from.
     #[arg(long, value_name = "N", conflicts_with_all = IN_JSBSIM, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     draws: Option<u32>,
-    /// Fly aircraft drawn from a distribution, so many, in place of JSBSim: a minute of random attitudes each. A controller
-    /// that needs a model is designed from the aircraft's own and from a textbook's.
+    /// In place of JSBSim, fly this number of aircraft drawn from a distribution, a minute of random attitudes each. A controller
+    /// that needs a model is designed from the aircraft's exact model and from its textbook model.
     #[arg(long, value_name = "N", conflicts_with_all = IN_JSBSIM, conflicts_with_all = UNUSED_BY_ANY, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     any: Option<u32>,
-    /// The distribution of --any, and models beside it whose aircraft fly the same minute.
+    /// The distribution of --any, and further models whose aircraft fly the same minute.
     #[command(flatten)]
     of_any: any::AnyArguments,
     /// Whether the controllers fly behind the envelope limiter, as in `fly` and `demo`, or bare, as in the paper.
     #[arg(long, value_name = "WHAT", default_value = "free", value_enum)]
     envelope: EnvelopeName,
-    /// Seed of the controllers' own randomness, with the air's and the draws'.
+    /// Seed of the random numbers of controllers, air and draws.
     #[arg(long, default_value_t = 1)]
     seed: u32,
     #[command(flatten)]

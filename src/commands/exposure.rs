@@ -1,4 +1,4 @@
-//! Access control of the clients' links: links of this machine, signed links, or links that the user allows explicitly.
+//! Access control of the clients' links. A link must stay on this machine, be signed, or be allowed explicitly by the user.
 //! The vehicle's link may be open, with a warning.
 
 use anyhow::{Result, bail};

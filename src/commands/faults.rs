@@ -30,28 +30,28 @@ use search::Search;
 /// Name of the default aircraft.
 const AIRCRAFT: &str = "x8";
 
-/// Error of a scenario or a monitor campaign with several controllers.
+/// Error message if a scenario or a monitor campaign is requested with several controllers.
 const ONE_CONTROLLER: &str =
     "--scenario and --monitor fly one controller: give --controller one name";
 
 /// The arguments of `greylag faults`.
 #[derive(Args)]
 pub struct Arguments {
-    /// Flights with each controller at each counterpart.
+    /// Number of flights for each controller and each counterpart.
     #[arg(long, value_name = "N", default_value_t = 100)]
     flights: u64,
-    /// Seed of the first flight; the others follow.
+    /// Seed of the first flight; the next flights have the following seeds.
     #[arg(long, value_name = "SEED", default_value_t = 0)]
     first: u64,
     /// Controllers that fly the campaign.
     #[arg(long, value_name = "NAME", num_args = 1.., default_values = ["lqi"], value_parser = choices::controller())]
     controller: Vec<ControllerKind>,
-    /// The simulator's aircraft; the simulated flight controllers have gains for the X8, so others fly with the
+    /// The simulator's aircraft; the simulated flight controllers have gains for the X8 only, so other aircraft need the
     /// counterpart sitl.
     #[arg(long, value_name = "NAME", default_value = AIRCRAFT, conflicts_with = "resume")]
     aircraft: String,
     /// Model that the controllers are designed from or plan with.
-    /// Flights that `--resume` notes are all of the default model.
+    /// The file of `--resume` is for the default model only.
     #[arg(
         long,
         value_name = "FILE",
@@ -65,20 +65,20 @@ pub struct Arguments {
     /// Show the faults and the messages of each flight with a finding.
     #[arg(long)]
     show: bool,
-    /// Record each flight in this file, and skip those that it has already (of the same program).
+    /// Record each flight in this file, and skip those that it already has; another program version needs another file.
     #[arg(long, value_name = "FILE")]
     resume: Option<PathBuf>,
-    /// Search this number of flights for one that breaks a rule of flight, with the first of the
-    /// controllers: faults, winds, targets and requests are varied, always from the flights that
-    /// came nearest. `--first` is its seed.
+    /// Search with this number of flights for a violation of a flight rule by the first controller:
+    /// faults, winds, targets and requests of the flights that are nearest to a violation are varied.
+    /// `--first` is the seed of the search.
     #[arg(long, value_name = "N", conflicts_with_all = ["flights", "resume", "show"])]
     search: Option<u64>,
     /// Fly the scenario in this file (JSON, as `--search` prints it) and show how far each rule is from being broken.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["flights", "resume", "show", "search", "json", "counterpart"])]
     scenario: Option<PathBuf>,
-    /// Fly this number of flights, healthy and with each failure, under the model monitor, with a
-    /// simulated ArduPlane whose attitude has errors drawn for each flight: false alarms and
-    /// delays. `--first` is the first seed.
+    /// Measure false alarms and detection delays of the model monitor: fly this number of flights
+    /// without a failure and with each failure, with a simulated ArduPlane whose attitude errors are
+    /// drawn for each flight. `--first` is the first seed.
     #[arg(long, value_name = "N", conflicts_with_all = ["flights", "resume", "show", "search", "scenario", "json", "counterpart"])]
     monitor: Option<u64>,
     #[command(flatten)]
@@ -91,7 +91,7 @@ struct Document<'a> {
     flights: &'a [Entry],
 }
 
-/// Reads the name of a counterpart.
+/// Option values: the names of the counterparts.
 fn counterparts() -> impl TypedValueParser<Value = Counterpart> {
     let names = Counterpart::ALL.map(|counterpart| {
         PossibleValue::new(counterpart.name()).help(match counterpart {
@@ -362,7 +362,7 @@ mod tests {
         roomy(|| {
             let model = fly::model("params/x8/jsbsim.toml".as_ref(), None).unwrap();
             let lqi = companion_with(ControllerKind::Lqi, &model, POLICY.as_ref()).unwrap();
-            // the envelope limiter would hold the bank
+            // this pilot has no envelope limiter, which would limit the bank angle
             let config = Config::for_model(&model).unwrap();
             let pilot = Pilot::new(config, lqi.controller.boxed_clone()).unwrap();
             let hardover = Companion { pilot, controller: Box::new(Hardover), ..lqi };

@@ -14,9 +14,9 @@ use crate::report;
 /// Whether an existing file may be replaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overwrite {
-    /// An existing file is kept, and the command fails. It has no option `--force`.
+    /// An existing file is kept, and the command fails. The command has no option `--force`.
     New,
-    /// An existing file is kept, and the command fails. Its option `--force` was not given.
+    /// An existing file is kept, and the command fails. The option `--force` was not given.
     Never,
     /// An existing file is replaced (option `--force`).
     Force,
@@ -33,7 +33,7 @@ pub fn is_stdout(path: Option<&Path>) -> bool {
     path == Some(Path::new("-"))
 }
 
-/// `--json` of a command.
+/// The option `--json` of a command.
 #[derive(clap::Args, Clone, Debug)]
 pub struct JsonArgument {
     /// Write all results as JSON; `-` for standard output, with nothing else on it.
@@ -100,7 +100,7 @@ pub fn write(path: &Path, content: &str, overwrite: Overwrite) -> Result<()> {
     writable(path, overwrite)?;
     if is_stdout(Some(path)) {
         return match std::io::stdout().write_all(content.as_bytes()) {
-            // the reader has seen enough, as in `greylag … | head`
+            // the reader has closed the pipe, as in `greylag … | head`
             Err(error) if error.kind() == ErrorKind::BrokenPipe => std::process::exit(0),
             written => Ok(written?),
         };
@@ -117,8 +117,8 @@ pub fn command_line() -> String {
     line_of(std::env::args_os().skip(1))
 }
 
-/// The command line with these arguments, quoted for a shell. An argument may be no Unicode text, such as the path of
-/// an old log: its invalid bytes are replaced.
+/// The command line with these arguments, quoted for a shell. If an argument is not valid Unicode, such as the path of
+/// an old log, its invalid bytes are replaced.
 fn line_of(arguments: impl Iterator<Item = OsString>) -> String {
     arguments.fold("greylag".into(), |line, word| line + " " + &quoted(Path::new(&word)))
 }

@@ -1,5 +1,5 @@
-//! Model and controller of a recorded flight, stored in the recording's folder. `replay` and `report` then need no
-//! options.
+//! Model and controller of a recorded flight. They are stored in the recording's folder, so that `replay` and `report`
+//! need no options for them.
 
 use std::path::{Path, PathBuf};
 
@@ -45,11 +45,11 @@ pub struct FlownWith {
     pub schedule: Option<PathBuf>,
     /// Profile of the vehicle's link.
     pub profile: ProfileName,
-    /// Quantity that the flight controller was commanded.
+    /// Quantity that was commanded to the flight controller.
     pub commanded: CommandName,
 }
 
-/// The options that `fly` and `demo` have in common.
+/// Options of `fly` or `demo` that are stored with the recording.
 #[derive(Clone, Copy, Debug)]
 pub struct Chosen<'a> {
     /// Controller that flies.
@@ -66,7 +66,7 @@ pub struct Chosen<'a> {
     pub schedule: Option<&'a Path>,
     /// The other end of the vehicle's link.
     pub profile: ProfileName,
-    /// Quantity that the flight controller is commanded.
+    /// Quantity that is commanded to the flight controller.
     pub commanded: CommandName,
 }
 

@@ -53,11 +53,11 @@ pub struct Arguments {
     /// Flight controller or simulator at the other end of the vehicle's link.
     #[arg(long, value_name = "NAME", default_value = "sitl", value_enum)]
     profile: ProfileName,
-    /// Commanded quantity of a real flight controller: surfaces (MANUAL), or attitude (OFFBOARD,
+    /// Quantity commanded to a real flight controller: surfaces (MANUAL), or attitude (OFFBOARD,
     /// GUIDED).
     #[arg(long, value_name = "WHAT", default_value = "surfaces", value_enum)]
     command: CommandName,
-    /// Link to clients; may be given several times. One that other machines reach needs --sign, or --insecure.
+    /// Link to clients; may be given several times. A link that other machines can reach needs --sign, or --insecure.
     #[arg(long = "client", value_name = "ADDRESS", default_values = ["udpin:127.0.0.1:14550", "udpout:127.0.0.1:14540"])]
     clients: Vec<Address>,
     /// Sign messages to clients and refuse unsigned ones, with the key in this file: 64 hexadecimal
@@ -89,7 +89,7 @@ pub struct Arguments {
     /// Airframe file in place of the one that the model names.
     #[arg(long, value_name = "FILE")]
     airframe: Option<PathBuf>,
-    /// Fly this flight-test schedule whenever a client is in offboard.
+    /// Fly this flight-test schedule whenever a client is in offboard mode.
     #[arg(long, value_name = "FILE")]
     schedule: Option<PathBuf>,
     /// New folder for the recording [default: the next number under flights/].
@@ -104,7 +104,7 @@ pub struct Arguments {
     /// Time after a state frame at which a plan is late, in milliseconds.
     #[arg(long, value_name = "MS", default_value_t = FlightOptions::PLAN_DEADLINE.as_millis() as u64, value_parser = clap::value_parser!(u64).range(1..=1000))]
     plan_deadline_ms: u64,
-    /// Run before all other programs (SCHED_FIFO), where the system permits it.
+    /// Run with real-time priority (SCHED_FIFO), where the system permits it.
     #[arg(long)]
     realtime: bool,
     /// End after this many seconds instead of at Ctrl-C.
@@ -112,7 +112,7 @@ pub struct Arguments {
     duration_s: Option<Duration>,
 }
 
-/// The vehicle's profile by name.
+/// Kind of the other end of the vehicle's link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ProfileName {
@@ -124,7 +124,7 @@ pub enum ProfileName {
     Ardupilot,
 }
 
-/// Commanded quantity, by name.
+/// Quantity that the companion commands to a real flight controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CommandName {
@@ -176,7 +176,7 @@ impl Arguments {
         self.sign.clone().map(|key| Signing { key, vehicle, local: self.local.clone() })
     }
 
-    /// Options that are recorded in the folder of the log.
+    /// Options that are stored with the recording.
     fn chosen(&self) -> Chosen<'_> {
         Chosen {
             controller: self.controller,
@@ -208,8 +208,8 @@ fn seconds(text: &str) -> Result<Duration, String> {
 /// Flies until Ctrl-C or the end of the duration.
 ///
 /// # Errors
-/// If a file cannot be read or is invalid, a link cannot be opened or a recording cannot be created. Nothing has been
-/// started then.
+/// If a file cannot be read or is invalid, a link cannot be opened or a recording cannot be created. In these cases no
+/// flight has been started.
 pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let asked = if arguments.insecure { Asked::Insecure } else { Asked::Nothing };
     let exposed = exposure::check(arguments.unsigned(), asked)?;

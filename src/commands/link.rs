@@ -64,19 +64,19 @@ struct Check {
     /// Link to the flight controller, such as serial:/dev/ttyACM0:921600.
     #[arg(long, value_name = "ADDRESS")]
     vehicle: Address,
-    /// The stack to check for [default: the one that answers].
+    /// Autopilot stack to check for [default: the stack that answers].
     #[arg(long, value_name = "NAME", value_enum)]
     profile: Option<ProfileName>,
     /// Model of the aircraft, for the actuators of its airframe.
     #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
     model: PathBuf,
-    /// Quantity that shall be commanded.
+    /// Quantity that will be commanded.
     #[arg(long, value_name = "WHAT", default_value = "surfaces", value_enum)]
     command: CommandName,
-    /// Controller whose delay margin is checked, when surfaces are commanded.
+    /// Controller whose delay margin is checked if surfaces are commanded.
     #[arg(long, value_name = "NAME", default_value = "lqi", value_parser = choices::controller())]
     controller: ControllerKind,
-    /// How long to measure.
+    /// Duration of the measurement.
     #[arg(long, value_name = "S", default_value_t = 8, value_parser = clap::value_parser!(u64).range(4..=3600))]
     seconds: u64,
     #[command(flatten)]
@@ -336,7 +336,7 @@ fn streams(real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
                     remedy(real.profile().stack)
                 )
             });
-            // One text names all denied streams.
+            // The text of a denial names all denied streams, so it is listed only once.
             if !missing.contains(&words) {
                 missing.push(words);
             }
@@ -374,7 +374,7 @@ fn remedy(stack: Stack) -> &'static str {
 mod tests {
     use super::*;
 
-    /// The delay margin of a check is that of the flight.
+    /// The check must use the same delay margin as the flight.
     #[test]
     fn a_link_without_a_rudder_command_is_checked_without_a_rudder() {
         let file = Path::new("params/c172p/jsbsim.toml");

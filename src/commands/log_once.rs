@@ -1,4 +1,4 @@
-//! Warnings on standard error, each printed once. Every worker that loads an aircraft issues the same warnings.
+//! Prints each warning on standard error only once, because every worker that loads an aircraft issues the same warnings.
 
 use std::collections::BTreeSet;
 use std::io::{self, Write};
@@ -9,7 +9,7 @@ static PRINTED: Mutex<BTreeSet<Vec<u8>>> = Mutex::new(BTreeSet::new());
 /// Largest number of stored lines. Further lines are printed each time.
 const REMEMBERED: usize = 1000;
 
-/// Standard error without repetitions.
+/// A writer to standard error that omits repeated lines.
 pub struct LogOnce;
 
 impl Write for LogOnce {

@@ -31,21 +31,21 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Show what logs hold, at which rates, with which gaps, and what each is missing for which
-    /// purpose. Exit status 3 when something makes the numbers of one wrong.
+    /// Show what logs hold, with rates and gaps, and which data each log lacks for which purpose. Exit
+    /// status 3 if a log has a problem that makes its numbers wrong.
     Info {
         /// CSV, PX4 ULog, ArduPilot .bin, MAVLink .tlog or ROS 2 bag (.mcap), distinguished by content.
         #[arg(required = true)]
         files: Vec<PathBuf>,
-        /// As JSON: an object, of several logs a list of them.
+        /// Print JSON: one object, or for several logs a list of objects.
         #[arg(long)]
         json: bool,
-        /// Write a mapping file that corrects the wrong units and signs that were found: what
-        /// --mapping takes.
+        /// Write a mapping file that corrects the wrong units and signs that were found, for the
+        /// option --mapping.
         #[arg(long, value_name = "FILE", conflicts_with = "json")]
         write_mapping: Option<PathBuf>,
-        /// The model file of the aircraft: its envelope sets the airspeed above which it flies.
-        /// Without it that is 7 m/s.
+        /// Model file of the aircraft, whose envelope sets the airspeed above which rows count as
+        /// flight [default: no model, 7 m/s].
         #[arg(long)]
         model: Option<PathBuf>,
         #[command(flatten)]
@@ -57,8 +57,8 @@ enum Verb {
         input: PathBuf,
         /// The CSV table to write.
         output: PathBuf,
-        /// The model file of the aircraft: its envelope sets the airspeed above which it flies.
-        /// Without it that is 7 m/s.
+        /// Model file of the aircraft, whose envelope sets the airspeed above which rows count as
+        /// flight [default: no model, 7 m/s].
         #[arg(long)]
         model: Option<PathBuf>,
         /// Replace the table if it exists.
@@ -68,11 +68,11 @@ enum Verb {
         reading: Reading,
     },
     /// Reconstruct the flight path of a log: write the states without sensor errors as a CSV table and
-    /// print the sensor errors, the wind and the clocks with their standard deviations.
+    /// print sensor errors, wind and clock skews with their standard deviations.
     Reconstruct {
         /// CSV, PX4 ULog, ArduPilot .bin, MAVLink .tlog or ROS 2 bag (.mcap), distinguished by content.
         input: PathBuf,
-        /// The table, in the columns of the log format.
+        /// The CSV table to write, with the columns of the log format.
         output: PathBuf,
         /// The model file of the aircraft: its actuators turn commands into deflections.
         #[arg(long, default_value = "params/x8/prior.toml")]
@@ -201,7 +201,7 @@ fn csv_file(flight: &Flight, output: &Path, force: bool) -> Result<()> {
     files::write(output, &text, force.into())
 }
 
-/// Number of decimals, 5 to 9, that shows two digits of a standard deviation.
+/// Number of decimals, 5 to 9, with which a standard deviation `sd` is shown with two digits.
 fn decimals(sd: f64) -> usize {
     if sd > 0.0 { (1.0 - sd.log10()).clamp(5.0, 9.0) as usize } else { 5 }
 }

@@ -26,7 +26,7 @@ pub fn of(kind: ControllerKind, model: &GreyBox) -> Result<Option<Duration>> {
     let kind = if designed && kind.pace() != Pace::Planned { kind } else { ControllerKind::Lqi };
     match build(kind, model) {
         Ok(controller) => Ok(or_unknown(delay_margin(controller.as_ref(), model))),
-        // Without an LQI, the substitute was reported already, and its delay margin is unknown.
+        // If there is no LQI, its substitute was reported already, and the delay margin is unknown.
         Err(_) if !designed => Ok(None),
         Err(why) => Err(why.into()),
     }

@@ -91,7 +91,7 @@ use crate::sysid::progress::Cancelled;
 #[cfg(feature = "study")]
 use interruption::{Ended, Interruption};
 
-/// The version that `-V` prints: the package's, the commit that the program was built from, its features.
+/// The text that `-V` prints: the version of the package, the commit of the build, and the features.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
     let features = [
         ("demo", cfg!(feature = "demo")),
@@ -110,7 +110,7 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// Print more messages; twice prints all.
+    /// Print more messages; if given twice, print all.
     #[arg(short, long, global = true, action = clap::ArgAction::Count, conflicts_with = "quiet")]
     verbose: u8,
     /// Show no progress and no warnings, only results and errors.
@@ -122,16 +122,16 @@ struct Arguments {
 enum Command {
     /// Describe an aircraft of your own, and check how it flies.
     Aircraft(aircraft::Arguments),
-    /// Refit a model to flights and add missing effects to it, judged on flights it has not seen.
+    /// Refit a model to flights and add missing effects to it, judged on flights that the fit has not seen.
     #[cfg(feature = "study")]
     Amend(amend::Arguments),
-    /// Run a campaign over priors, controllers and seeds; gather and tabulate it.
+    /// Run a campaign over priors, controllers and seeds; gather and tabulate the results.
     #[cfg(feature = "study")]
     Campaign(campaign::Arguments),
-    /// Explore in JSBSim, to have flights to learn from.
+    /// Fly exploration flights in JSBSim, from which models are learned.
     #[cfg(feature = "demo")]
     Collect(collect::Arguments),
-    /// Compare models with flight logs: how far predictions stray, in which channel and regime.
+    /// Compare models with flight logs: prediction errors by horizon, channel and flight condition.
     Compare(compare::Arguments),
     /// Write completions for a shell to standard output.
     #[cfg(feature = "study")]
@@ -151,22 +151,22 @@ enum Command {
     /// Score controllers on the target file, flown in JSBSim in this process.
     #[cfg(feature = "demo")]
     Evaluate(evaluate::Arguments),
-    /// Fly many seeded flights under faults of link, sensors, clocks; judge them.
+    /// Fly many seeded flights under faults of link, sensors and clocks, and check them.
     #[cfg(feature = "demo")]
     Faults(faults::Arguments),
     /// Fly a vehicle, serving ground stations and offboard programs.
     Fly(fly::Arguments),
-    /// Learn a controller that flies from a prior: flights, model, policy, in one command.
+    /// Learn a controller from a prior model in one command: flights, model, policy.
     #[cfg(feature = "learn")]
     Learn(learn::Arguments),
     /// Check the link to a flight controller.
     Link(link::Arguments),
     /// Show what a flight log holds, or write it as a CSV table.
     Logs(logs::Arguments),
-    /// Fly an aircraft that has an effect which its model lacks: data to find it in.
+    /// Fly a simulated aircraft with an effect that its model lacks, for a blind test of the diagnosis.
     #[cfg(feature = "demo")]
     Mystery(mystery::Arguments),
-    /// Propose a formula for what no effect of the catalogue explains.
+    /// Propose a formula for errors that no effect of the catalogue explains.
     #[cfg(feature = "study")]
     Propose(propose::Arguments),
     /// Write the manual pages of every subcommand into a folder.
@@ -309,7 +309,7 @@ fn command_of(line: &[OsString]) -> Result<Command> {
     Ok(<Arguments as clap::FromArgMatches>::from_arg_matches(&found)?.command)
 }
 
-/// Rejects lines that are neither a learning stage nor a campaign cell.
+/// Checks that a line is a stage of `greylag learn` or a campaign cell.
 #[cfg(feature = "study")]
 fn check_line(line: &[OsString]) -> Result<()> {
     match command_of(line)? {
@@ -321,7 +321,7 @@ fn check_line(line: &[OsString]) -> Result<()> {
     }
 }
 
-/// Runs a learning stage or a campaign cell until `stop` is set. An evaluation ignores `stop`.
+/// Runs a stage of `greylag learn` or a campaign cell until `stop` is set. An evaluation ignores `stop`.
 #[cfg(feature = "study")]
 #[cfg_attr(not(any(feature = "demo", feature = "learn")), expect(unused_variables))]
 fn carry_out(line: &[OsString], stop: &Interruption) -> Result<Ended> {
@@ -345,7 +345,7 @@ mod tests {
         let words =
             ["aircraft", "new", "own", "--mass-kg", "-2", "--span-m", "2", "--area-m2", "1"];
         let line = words.map(OsString::from);
-        // its own check says what a mass may be
+        // the command itself checks the range of the mass
         assert!(matches!(command_of(&line), Ok(Command::Aircraft(_))));
     }
 }

@@ -38,37 +38,37 @@ pub struct Arguments {
     /// New folder for the logs, the model and the sealed answer.
     #[arg(long, value_name = "DIR", required_unless_present = "open")]
     out: Option<PathBuf>,
-    /// Model that flies as the simulator's aircraft does: the answer is hidden in the aircraft, and the model of the
-    /// folder is this one with errors. Its airframe is copied beside it.
+    /// Exact model of the simulator's aircraft. The effect is hidden in the aircraft, and the folder receives this model
+    /// with errors in its coefficients and a copy of its airframe.
     #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
     model: PathBuf,
-    /// Folder that holds NAME/NAME.xml; without it one built into the program flies.
+    /// Folder that holds NAME/NAME.xml; without it an aircraft built into the program flies.
     #[arg(long, value_name = "DIR", requires = "aircraft")]
     aircraft_dir: Option<PathBuf>,
-    /// Name of the simulator's aircraft that the model is of [default: x8].
+    /// Name of the simulator's aircraft that the model describes [default: x8].
     #[arg(long, value_name = "NAME", requires = "model")]
     aircraft: Option<String>,
-    /// Hide this effect instead of one drawn from the seed; a wrong ID is answered with a list of
-    /// all.
+    /// Hide this effect instead of one drawn from the seed; an unknown ID prints a list of all
+    /// effects.
     #[arg(long, value_name = "ID", group = "what")]
     effect: Option<String>,
     /// Hide the effect of this file, with the values that the file has.
     #[arg(long, value_name = "FILE", group = "what")]
     hide: Option<PathBuf>,
-    /// Amplitude in the effect's unit; for an effect of a file, its first coefficient.
+    /// Amplitude in the effect's unit; for an effect of a file, the value of its first coefficient.
     #[arg(long, requires = "what", allow_negative_numbers = true, value_parser = finite)]
     amplitude: Option<f64>,
     /// Fly in MIL-spec turbulence: 3 light, 4 moderate.
     #[arg(long, value_name = "1..7", value_parser = clap::value_parser!(u8).range(1..=7))]
     turbulence_severity: Option<u8>,
-    /// Controller of the flights. `any` and `adaptive` know of the aircraft its cruise airspeed and whether it has a rudder: they
-    /// explore an aircraft without a model.
+    /// Controller of the flights. `any` and `adaptive` use no model: they need only the cruise airspeed and whether the aircraft
+    /// has a rudder.
     #[arg(long, value_name = "NAME", default_value = "lqi", value_parser = choices::controller())]
     controller: ControllerKind,
-    /// Reveal the answer of a folder, beside the result in its diagnosis.json.
+    /// Reveal the answer of a folder, and compare it with the folder's diagnosis.json.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["seed", "out", "what", "turbulence_severity"])]
     open: Option<PathBuf>,
-    /// Open the answer without a diagnosis: the game is over then.
+    /// Reveal the answer even if the folder has no diagnosis yet.
     #[arg(long, requires = "open")]
     give_up: bool,
 }

@@ -10,13 +10,13 @@ const MOST_TIMES: f64 = 100.0;
 /// Constants that may differ from flight to flight.
 #[derive(clap::Args, Clone, Copy, Debug)]
 pub struct PerFlightArguments {
-    /// Estimate trims for each flight (CD0, CL0, CY0, Cl0, Cm0, Cn0, a share of the thrust) together
-    /// with the common coefficients; FACTOR times their usual standard deviations.
+    /// Estimate trims for each flight (CD0, CL0, CY0, Cl0, Cm0, Cn0, a fraction of the thrust) together
+    /// with the common coefficients; FACTOR multiplies their usual prior standard deviations.
     #[arg(long, value_name = "FACTOR", num_args = 0..=1, require_equals = true, default_missing_value = "1",
           value_parser = factor)]
     flight_trims: Option<f64>,
-    /// Take each flight's measured axes (the autopilot's board, the markers of motion capture) to be turned against the
-    /// body by three small constant angles of this standard deviation, in degrees.
+    /// Estimate three small constant angles by which each flight's measured axes (the autopilot's board, the markers of
+    /// motion capture) are rotated against the body axes, with this prior standard deviation in degrees.
     #[arg(long, value_name = "DEG", value_parser = degrees)]
     axes_askew: Option<f64>,
 }

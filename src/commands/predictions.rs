@@ -1,4 +1,4 @@
-//! Free runs as a table: the predictions of a model from every start of a flight.
+//! Free runs (open-loop simulations) as a table: the predictions of a model from every start of a flight.
 
 use std::fmt::Write;
 
@@ -13,7 +13,7 @@ use crate::sysid::weak_form::prepared::Prepared;
 /// Half width of a 95 % interval of the normal distribution, in standard deviations.
 const NORMAL_95: f64 = 1.96;
 
-/// A predicted and a measured state.
+/// A predicted and a measured state at one horizon after one start.
 struct Row<'a> {
     model: &'a str,
     flight: String,

@@ -1,4 +1,4 @@
-//! `greylag propose`: a formula for what no effect of the catalogue explains.
+//! `greylag propose`: searches for a formula for errors that no effect of the catalogue explains.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -27,7 +27,7 @@ pub struct Arguments {
     model: PathBuf,
     #[command(flatten)]
     logs: LogArguments,
-    /// Logs that the search does not see, on which the formula is tested; without them the last log.
+    /// Logs that the search does not see, on which the formula is tested [default: the last log].
     #[arg(long, num_args = 1..)]
     hold_out: Vec<PathBuf>,
     /// Write the effect file, which `greylag amend --effect` takes.
@@ -39,16 +39,16 @@ pub struct Arguments {
     /// Effect files (TOML) or folders of them, tried as candidates in addition to the catalogue.
     #[arg(long = "effect", value_name = "FILE", num_args = 1..)]
     effects: Vec<String>,
-    /// Ids to be left out of the catalogue.
+    /// Ids of effects of the catalogue that are not tried.
     #[arg(long, num_args = 1..)]
     without: Vec<String>,
-    /// Try the shapes of the library only, no free forms.
+    /// Try only the shapes of the library, and no free forms.
     #[arg(long)]
     library_only: bool,
     /// Bootstrap draws under the null hypothesis (no effect missing) that set the thresholds.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(20..))]
     nulls: u16,
-    /// Seed of everything that is drawn.
+    /// Seed of all random draws.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Replace the files if they exist.
@@ -56,7 +56,7 @@ pub struct Arguments {
     force: bool,
 }
 
-/// Reads, reconstructs, searches; prints what was found; writes the effect file.
+/// Reads and reconstructs the flights and searches for a formula. Prints the result, and writes the effect file.
 ///
 /// # Errors
 /// If a file cannot be read or written, or the flights do not allow a search.
@@ -108,7 +108,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// Logs to search in and logs to test on. If no logs are held out, the last one is tested on.
+/// Logs for the search and logs for the test. If none is held out, the last log is for the test.
 fn divided(arguments: &Arguments) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
     let (logs, held) = (&arguments.logs.paths, &arguments.hold_out);
     distinct(logs, held)?;

@@ -42,7 +42,7 @@ pub struct Reporter<'a> {
     pub segments: Vec<Segment>,
     /// Texts that the companion sent, with their times, s.
     pub texts: Vec<(f64, String)>,
-    /// Candidates of the planner shortly after each new target.
+    /// The planner's candidate plans shortly after each new target.
     pub sights: Vec<Sight>,
 }
 
@@ -104,11 +104,12 @@ impl Reporter<'_> {
     }
 }
 
-/// Ticks after a new target at which the planner's rollouts are taken. By then the plan has begun to move the aircraft.
+/// Number of control cycles after a new target at which the planner's candidates are taken. By then the plan has begun to
+/// move the aircraft.
 const REPORTED_AFTER: usize = 20;
 
-/// Candidates of the planner of `companion`, `REPORTED_AFTER` ticks after each new target, from a replay of the
-/// recording in `folder`. Prints how many commands are reproduced to the bit.
+/// Candidate plans of the planner of `companion`, `REPORTED_AFTER` control cycles after each new target, from a replay of
+/// the recording in `folder`. Prints how many commands are reproduced to the bit.
 pub fn sights(folder: &Path, companion: Companion, vehicle: Vehicle) -> Result<Vec<Sight>> {
     println!("replaying the recording, to show what the planner saw");
     let mut all = Vec::new();
@@ -164,8 +165,8 @@ pub fn segments(flight: &Flight) -> Vec<Segment> {
     runs.map(score).collect()
 }
 
-/// Whether a sample has this target (roll, pitch, rad). A recorded target has passed through a quaternion in single
-/// precision, accurate to 1e-7.
+/// Whether a sample has this target (roll, pitch, rad). A recorded target was sent as a quaternion in single precision,
+/// which is accurate to 1e-7.
 fn wants(s: &Sample, [roll, pitch]: [f64; 2]) -> bool {
     (s.roll_target_rad - roll).abs() + (s.pitch_target_rad - pitch).abs() < 1e-5
 }

@@ -34,19 +34,19 @@ pub struct Arguments {
     json: JsonArgument,
 }
 
-/// Options on what flew, where it differs from the recording's own statement.
+/// Options that replace the recording's own entries on controller, model and link.
 #[derive(Args, Debug)]
 pub struct FlownArguments {
     /// Controller that flew [default: as recorded, else hybrid-ilqr].
     #[arg(long, value_name = "NAME", value_parser = choices::controller())]
     controller: Option<ControllerKind>,
-    /// Model that it was designed from [default: as recorded].
+    /// Model that the controller was designed from [default: as recorded].
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Folder of the trained policy, for controllers that need one [default: as recorded].
     #[arg(long, value_name = "DIR")]
     policy: Option<PathBuf>,
-    /// Settings of the planner that were not of their usual size [default: as recorded].
+    /// Settings of the planner that differed from the defaults [default: as recorded].
     #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
     changes: Vec<Change>,
     /// Airframe file in place of the one that the model names [default: as recorded].
@@ -58,7 +58,7 @@ pub struct FlownArguments {
     /// Profile of the vehicle's link [default: as recorded, else sitl].
     #[arg(long, value_name = "NAME", value_enum)]
     profile: Option<ProfileName>,
-    /// Commanded quantity of a real flight controller [default: as recorded, else surfaces].
+    /// Quantity commanded to a real flight controller [default: as recorded, else surfaces].
     #[arg(long, value_name = "WHAT", value_enum)]
     command: Option<CommandName>,
 }

@@ -26,7 +26,7 @@ pub fn shipped(path: &Path) -> PathBuf {
     if let Some(found) = places.find(|p| p.exists()) {
         return found;
     }
-    // a file that is found nowhere is reported with the path that was requested, not that in the cache
+    // a file that is found nowhere is reported with the requested path, not with a path in the cache
     if !path.strip_prefix(FOLDER).is_ok_and(|inside| PARAMS.contains(inside)) {
         return path.into();
     }
@@ -40,7 +40,8 @@ pub fn shipped(path: &Path) -> PathBuf {
     }
 }
 
-/// The folder that `variable` names, or `below` in the home folder.
+/// The folder in the environment variable `variable` if it is an absolute path, else the folder `below` in the home folder.
+/// `of` returns the value of an environment variable.
 fn home(variable: &str, below: &str, of: &dyn Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
     let named = of(variable).map(PathBuf::from).filter(|p| p.is_absolute());
     named.or_else(|| Some(Path::new(&of("HOME")?).join(below)))

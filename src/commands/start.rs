@@ -13,11 +13,11 @@ const X8: &str = "x8";
 /// four digits.
 const TRAVEL_TOLERANCE: f64 = 1e-3;
 
-/// Where an episode begins.
+/// Options for the initial state of an episode.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Start")]
 pub struct StartArguments {
-    /// True airspeed at the start, which is also the one that is wanted [default: 16.67 for the X8,
+    /// True airspeed at the start, which is also the commanded airspeed [default: 16.67 for the X8,
     /// else the cruise airspeed of the model's airframe].
     #[arg(long, value_name = "MPS")]
     start_airspeed_mps: Option<f64>,

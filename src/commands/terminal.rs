@@ -98,7 +98,7 @@ pub fn say(line: Arguments<'_>) {
     let _ = writeln!(io::stdout(), "{line}");
 }
 
-/// Prints an error of the program to standard error, and ignores a closed one like [`say`].
+/// Prints an error of the program to standard error. A closed standard error is ignored, as in [`say`].
 pub fn complain(line: Arguments<'_>) {
     let _ = writeln!(io::stderr(), "greylag: {line}");
 }
@@ -116,7 +116,7 @@ pub fn print_answer(answer: &Answer) {
     println!();
 }
 
-/// Prints the last lines of a command: its summary, and the command that comes next.
+/// Prints the last lines of a command: its summary, and the command to run next.
 pub fn print_summary(answer: &Answer) {
     println!("\n{}", answer.summary());
     if !answer.next.is_empty() {

@@ -22,10 +22,11 @@ use crate::workbench::session::FILE;
     after_help = "The page is served on this machine only, to whoever has the token of the printed address. Everything is kept in the session's folder as it happens; Ctrl-C ends the workbench, and the same command goes on from there."
 )]
 pub struct Arguments {
-    /// Flight logs to begin with: CSV, PX4 ULog, ArduPilot .bin, MAVLink .tlog or ROS 2 bag (.mcap); more can be dropped on the page.
+    /// Flight logs to begin with: CSV, PX4 ULog, ArduPilot .bin, MAVLink .tlog or ROS 2 bag (.mcap); more can be dropped on
+    /// the page.
     logs: Vec<PathBuf>,
-    /// The model file. An existing session knows its own; a new one takes that of the environment variable
-    /// GREYLAG_MODEL where this is left out.
+    /// Model file [default: the model of the session; for a new session, the file named by the environment variable
+    /// GREYLAG_MODEL].
     #[arg(long)]
     model: Option<PathBuf>,
     /// Port on 127.0.0.1; 0 for any that is free.
@@ -38,7 +39,7 @@ pub struct Arguments {
     reading: Reading,
 }
 
-/// The model of the option. A new session without the option takes the model of the environment variable.
+/// Path of the model from the option, or for a new session without the option from the environment variable.
 fn model(arguments: &Arguments) -> Option<PathBuf> {
     let new = !arguments.folder.join(FILE).exists();
     let environment = || std::env::var_os("GREYLAG_MODEL").filter(|_| new).map(PathBuf::from);

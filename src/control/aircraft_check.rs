@@ -11,14 +11,14 @@ use greylag_model::{GreyBox, Trim, TrimError};
 
 /// Number of airspeeds in the trim table.
 const SPEEDS: usize = 7;
-/// Fraction of a surface's travel used by trim above which a finding is reported. The remaining fifth is kept for
-/// manoeuvres and gusts.
+/// Largest fraction of the elevator's travel that trim may use without a finding. The remaining fifth is kept for manoeuvres
+/// and gusts.
 const MUCH_TRAVEL: f64 = 0.8;
 /// Total delay of sensing, link and servo that is typical of a small aircraft, s.
 const USUAL_DELAY: f64 = 0.04;
-/// Resolution of the search for the fastest level flight, m/s.
+/// Accuracy of the search for the fastest level flight, m/s.
 const LEVEL_WITHIN_MPS: f64 = 0.01;
-/// Roll rate at full aileron below which the roll authority is reported as low, rad/s (20°/s).
+/// Smallest steady roll rate at full aileron without a finding, rad/s (20°/s).
 const SLOW_ROLL: f64 = 0.35;
 
 /// Steady straight flight at one airspeed. Where level flight is not possible, it is a descent at full throttle or at idle.
@@ -36,7 +36,7 @@ pub struct Level {
     pub path: f64,
 }
 
-/// The recommended controller, with the smallest delay margin of its loops.
+/// The recommended controller and its delay margin.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Advised {
     /// Name of the controller in the registry.
@@ -52,7 +52,8 @@ pub struct AircraftCheck {
     pub levels: Vec<Level>,
     /// The modes at the cruise airspeed.
     pub modes: Vec<Mode>,
-    /// Fastest level flight, m/s. `None` if level flight is possible at the highest airspeed, or not even at cruise.
+    /// Airspeed of the fastest level flight, m/s. `None` if level flight is possible at the envelope's highest airspeed, or
+    /// not even at cruise.
     pub level_up_to: Option<f64>,
     /// The recommended controller.
     pub controller: Advised,
@@ -100,7 +101,8 @@ pub fn check(model: &GreyBox) -> Result<AircraftCheck, CheckError> {
     Ok(check)
 }
 
-/// Recommends the LQI. If its delay margin is below `USUAL_DELAY` and the damped LQI's is larger, recommends the damped LQI.
+/// Recommends the LQI or, for a larger delay margin, the damped LQI. The damped LQI is recommended only if the LQI's margin is
+/// below `USUAL_DELAY` and the damped LQI's is larger.
 fn advised(model: &GreyBox) -> Result<Advised, CheckError> {
     let cruise = model.airframe.envelope.airspeed_cruise_mps;
     let least = |weights: &Weights| -> Result<f64, MarginsError> {
@@ -121,8 +123,8 @@ fn flies_level(model: &GreyBox, airspeed: f64) -> bool {
     trim.is_ok_and(|t| (0.0..=1.0).contains(&t.controls.throttle))
 }
 
-/// The fastest level flight between the cruise airspeed and the envelope's highest airspeed, m/s. `None` if level flight
-/// is possible at the highest airspeed, or not even at cruise.
+/// Returns the airspeed (m/s) of the fastest level flight between the cruise airspeed and the envelope's highest airspeed.
+/// `None` if level flight is possible at the highest airspeed, or not even at cruise.
 pub fn fastest_level(model: &GreyBox) -> Option<f64> {
     let envelope = model.airframe.envelope;
     let (mut slow, mut fast) = (envelope.airspeed_cruise_mps, envelope.airspeed_max_mps);

@@ -1,10 +1,10 @@
-//! Derivatives of roll and pitch of the aircraft, estimated in flight from body rates, flow angles and deflections.
+//! Stability and control derivatives of roll and pitch, estimated in flight from body rates, flow angles and deflections.
 //!
-//! Equation error in the time domain (E. A. Morelli, V. Klein, "Aircraft System Identification", 2nd ed., 2016, chapter 5) by
-//! recursive least squares with a prior: ω̇ is a sum of terms, each a coefficient times a measured quantity. Both sides are
-//! differentiated and pass the same low-pass filters. The differentiation removes constant and slow influences (trim, wind).
-//! A delay between measured and effective deflections is unknown: regressions with several delays run in parallel, and the one
-//! with the smallest error counts.
+//! The method is equation error in the time domain (E. A. Morelli, V. Klein, "Aircraft System Identification", 2nd ed., 2016,
+//! chapter 5) by recursive least squares with a prior. In the regression, ω̇ is a sum of terms, each a coefficient times a
+//! measured quantity. Both sides are differentiated and pass the same low-pass filters. The differentiation removes constant
+//! and slow influences (trim, wind). The delay between measured and effective deflections is unknown. Regressions with several
+//! delays therefore run in parallel, and the estimates are taken from the one with the smallest mean square error.
 //!
 //! The estimator needs no model, and no command depends on it. Its estimates are for display and for the flight's summary.
 
@@ -12,17 +12,17 @@ use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{ActuatorState, Airframe, State, Time};
 
 /// Names of the estimates, in the order of [`AircraftEstimator::derivatives`]: the dimensional derivatives L_δa, L_p, M_δe and
-/// M_α at the cruise airspeed. M_q is estimated with them and not given: flights in closed loop hardly determine it beside M_α
+/// M_α at the cruise airspeed. M_q is estimated too but not returned, because closed-loop flights hardly separate it from M_α
 /// (`docs/explanation/planner.md`).
 pub const DERIVATIVES: [&str; 4] = ["L_da", "L_p", "M_de", "M_a"];
 
-/// Number of terms of each axis that depend on controls, and of those that depend on the motion alone.
+/// Number of regression terms of each axis that depend on the controls. `MOTION` terms depend on the motion alone.
 const CONTROLS: usize = 2;
 const MOTION: usize = 5;
 const TERMS: usize = CONTROLS + MOTION;
-/// Prior means and standard deviations of the coefficients of roll and pitch, dimensionless by V/g at the cruise airspeed V. Those of
-/// control power, damping and stiffness are medians and spreads of drawn aircraft (`greylag aircraft draw`). The order is that
-/// of [`of_controls`], then that of [`of_motion`].
+/// Prior means and standard deviations of the coefficients of roll and pitch, made dimensionless with V/g at the cruise
+/// airspeed V. Those of control power, damping and stiffness are medians and spreads of drawn aircraft (`greylag aircraft
+/// draw`). The coefficients are in the order of [`of_controls`], followed by that of [`of_motion`].
 const PRIORS: [[[f64; TERMS]; 2]; 2] = [
     [[200.0, 0.0, 15.0, 0.0, 0.0, 0.0, 0.0], [250.0, 30.0, 10.0, 300.0, 20.0, 1.0, 1.0]],
     [[150.0, 0.0, 10.0, 40.0, 0.0, 0.0, 0.0], [200.0, 30.0, 7.0, 50.0, 30.0, 1.0, 1.0]],
@@ -31,18 +31,18 @@ const PRIORS: [[[f64; TERMS]; 2]; 2] = [
 const CORNER: f64 = 10.0;
 /// Standard deviation of the regression's error, 1/s². Its product with V/g (s) has the unit of the regression's left side.
 const NOISE: f64 = 4.0;
-/// Delays of the controls that are tried, in samples, the longest last.
+/// Delays of the controls for which regressions run, in samples. The longest is last.
 const DELAYS: [usize; 4] = [0, 2, 4, 6];
 const LONGEST: usize = DELAYS[DELAYS.len() - 1];
-/// Time constant of the mean square error that compares the delays, s.
+/// Time constant of the running mean square error by which the delays are compared, s.
 const FORGETTING_S: f64 = 20.0;
 /// Growth rate of each variance by forgetting, as a fraction of the prior variance, 1/s.
 const AGEING: f64 = 1e-4;
 /// Accepted sample intervals, s.
 const STEPS_S: std::ops::RangeInclusive<f64> = 0.002..=0.05;
-/// Ratio of an estimate's standard deviation to that of its prior below which the estimate counts as known.
+/// An estimate counts as known if its standard deviation is less than this fraction of its prior's.
 const KNOWN: f64 = 0.3;
-/// Range of the airspeed over the cruise airspeed in which the estimates are updated.
+/// Range of the ratio of airspeed to cruise airspeed in which the estimates are updated.
 const SPEEDS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
 /// Estimator of the derivatives of one aircraft. [`AircraftEstimator::see`] is called with each state of a flight, in the order
@@ -51,11 +51,12 @@ const SPEEDS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 pub struct AircraftEstimator {
     /// Cruise airspeed, m/s.
     cruise: f64,
-    /// Full travel of aileron, elevator and rudder, rad; infinite for an aircraft without a rudder.
+    /// Full travel of aileron, elevator and rudder, rad. The rudder's is infinite for an aircraft without a rudder.
     travel: [f64; 3],
     /// Roll and pitch.
     axes: [Axis; 2],
-    /// Controls over their travels, the newest first; `None` before the first sample and after an interruption.
+    /// Controls of the last samples, newest first: aileron, elevator and rudder divided by their travels, then the throttle.
+    /// `None` before the first sample and after an interruption.
     controls: Option<[[f64; 4]; LONGEST + 1]>,
     last: Option<Time>,
 }
@@ -85,7 +86,7 @@ struct Regression {
     error: f64,
 }
 
-/// The derivative of a signal behind two first-order lags.
+/// Filter for the time derivative of a signal, with two first-order lags.
 #[derive(Clone, Copy, Debug)]
 struct Filter {
     low: f64,
@@ -97,7 +98,8 @@ impl Filter {
         Filter { low, slope: 0.0 }
     }
 
-    /// Takes a further sample `x`, `step` seconds after the previous one. Returns the filtered derivative before and after it.
+    /// Filters a further sample `x`, `step` seconds after the previous one. Returns the filtered derivative before and after this
+    /// sample.
     fn take(&mut self, x: f64, step: f64) -> [f64; 2] {
         let before = self.slope;
         self.low += step * CORNER * (x - self.low);
@@ -115,8 +117,9 @@ impl Axis {
         Axis { regressions: std::array::from_fn(|_| Regression::new(prior)), filters: None }
     }
 
-    /// Updates with the body rate (rad/s), the terms of the motion, and those of the controls for each delay. `time` is V/g
-    /// at the cruise airspeed, s. Values that are not finite restart the filters.
+    /// Updates the regressions with the body rate (rad/s), the terms of the motion, and the terms of the controls for each delay.
+    /// `time` is V/g at the cruise airspeed, s. `step` is the time since the last sample, s. Values that are not finite restart
+    /// the filters.
     fn see(
         &mut self,
         rate: f64,
@@ -133,7 +136,7 @@ impl Axis {
             let (rate, motion) = (Filter::at(rate), motion.map(Filter::at));
             return self.filters = Some(Filters { rate, motion, controls });
         };
-        // the difference of two rates is the acceleration in the middle between them
+        // the difference quotient of two samples is the derivative midway between them
         let [before, after] = filters.rate.take(rate, step);
         let y = (after - before) / step * time * time;
         let motion: [f64; MOTION] =
@@ -150,7 +153,7 @@ impl Axis {
         }
     }
 
-    /// The regression with the delay that explains the flight best.
+    /// The regression with the smallest mean square error.
     fn best(&self) -> &Regression {
         let all = &self.regressions;
         all.iter().min_by(|a, b| a.error.total_cmp(&b.error)).unwrap_or(&all[0])
@@ -164,7 +167,8 @@ impl Regression {
         Regression { prior_sd: sd, theta: mean, covariance, error: 0.0 }
     }
 
-    /// One step of the least squares: `y` = θ·x with an error of `noise`.
+    /// One step of recursive least squares for `y` = θ·`x`, whose error has the standard deviation `noise`. `step` is the time
+    /// since the last sample, s.
     fn learn(&mut self, x: &[f64; TERMS], y: f64, noise: f64, step: f64) {
         let dot = |a: &[f64; TERMS]| a.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
         let spread: [f64; TERMS] = std::array::from_fn(|k| dot(&self.covariance[k]));
@@ -183,15 +187,15 @@ impl Regression {
         }
     }
 
-    /// Coefficient `k`; NaN if its standard deviation is above [`KNOWN`] of the prior's.
+    /// Coefficient `k`. NaN if its standard deviation exceeds the fraction [`KNOWN`] of its prior's.
     fn known(&self, k: usize) -> f64 {
         let narrowed = self.covariance[k][k].sqrt() / self.prior_sd[k];
         if narrowed < KNOWN { self.theta[k] } else { f64::NAN }
     }
 }
 
-/// Terms of roll and pitch that depend on `controls`: aileron, elevator and rudder over their travels, and the throttle.
-/// `speed` is the airspeed over the cruise airspeed.
+/// Regression terms of roll (aileron, rudder) and pitch (elevator, throttle) that depend on the controls. The deflections are
+/// divided by their travels. `speed` is the airspeed divided by the cruise airspeed.
 fn of_controls(
     [aileron, elevator, rudder, throttle]: [f64; 4],
     speed: f64,
@@ -200,8 +204,9 @@ fn of_controls(
     [[aileron * pressure, rudder * pressure], [-elevator * pressure, throttle]]
 }
 
-/// Terms of roll and pitch that depend on the motion: damping, then β and the yaw rate (roll), α and the trim moment (pitch), and
-/// the two gyroscopic moments. `time` is V/g at the cruise airspeed, s.
+/// Regression terms that depend on the motion. Those of roll are the damping, β, the yaw rate and two gyroscopic moments. Those
+/// of pitch are the damping, α, the trim moment and two gyroscopic moments. `speed` is the airspeed divided by the cruise
+/// airspeed, and `time` is V/g at the cruise airspeed, s.
 fn of_motion(s: &State, speed: f64, time: f64) -> [[f64; MOTION]; 2] {
     let (pressure, rate, square) = (speed * speed, speed * time, time * time);
     [
@@ -234,8 +239,8 @@ impl AircraftEstimator {
         }
     }
 
-    /// Updates the estimates with a state and the deflections at `time`. After a gap in time, or a state that is not finite, the
-    /// filters restart; the estimates remain. The function allocates no memory.
+    /// Updates the estimates with a state and the deflections at `time`. After a gap in time or a state that is not finite, the
+    /// filters restart and the estimates remain. The function allocates no memory.
     pub fn see(&mut self, time: Time, state: &State, actuators: &ActuatorState) {
         let before = self.last.replace(time);
         let step = before.map_or(f64::NAN, |before| time.since(before).as_secs_f64());
@@ -270,8 +275,8 @@ impl AircraftEstimator {
     }
 
     /// The dimensional derivatives at the cruise airspeed, in the order of [`DERIVATIVES`]: L_δa and M_δe in rad/s² at full
-    /// deflection (L_δa is positive, M_δe negative), L_p in 1/s, M_α in 1/s². NaN if the flight does not determine the value: its
-    /// standard deviation is above 0.3 of the prior's.
+    /// deflection (L_δa is positive, M_δe negative), L_p in 1/s, M_α in 1/s². A value that the flight does not determine is NaN:
+    /// its standard deviation exceeds 0.3 of its prior's.
     pub fn derivatives(&self) -> [f64; DERIVATIVES.len()] {
         let time = self.cruise / STANDARD_GRAVITY;
         let [roll, pitch] = self.axes.each_ref().map(Axis::best);
@@ -286,7 +291,7 @@ impl AircraftEstimator {
 mod tests {
     use super::*;
 
-    /// The rate obeys a power of 120, a damping of 12 and a constant trim moment, and follows the control after 40 ms.
+    /// The simulated axis has a control power of 120, a damping of 12, a constant trim moment and a control delay of 40 ms.
     #[test]
     fn control_power_and_damping_are_found_beside_a_delay() {
         let (time, step, truth) = (2.0, 0.01, [120.0, 12.0]);
@@ -297,7 +302,7 @@ mod tests {
         for k in 0..3000 {
             let controls = DELAYS.map(|delay| [command(k - delay as i32), 0.0]);
             axis.see(rate, &[-rate * time, 0.0, 0.0, 0.0, 0.0], &controls, [time, step]);
-            // ten steps of integration between two samples stand for continuous time
+            // ten integration steps between two samples approximate continuous time
             for part in 0..10 {
                 let at = f64::from(part) / 10.0;
                 let now = (1.0 - at) * command(k - 4) + at * command(k - 3);

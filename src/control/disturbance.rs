@@ -1,7 +1,7 @@
 //! Estimate of the disturbance: the state rate that the model does not explain, constant over a plan.
 //!
 //! The method is offset-free model predictive control (Pannocchia and Rawlings, AIChE J. 49, 2003) with the disturbance on
-//! the states. In steady flight the planner's model with the disturbance is also steady, at any model error.
+//! the states. If the aircraft flies steadily, the planner's model with the disturbance is steady too, whatever the model error.
 
 use crate::Observation;
 use greylag_model::{GreyBox, Memory, STEP};
@@ -12,20 +12,22 @@ use greylag_physics::actuators::Actuators;
 pub(crate) const NONE: State =
     State { roll: 0.0, pitch: 0.0, airspeed: 0.0, p: 0.0, q: 0.0, r: 0.0, alpha: 0.0, beta: 0.0 };
 
-/// Default time constant of the estimate, s. A shorter one follows the noise, a longer one lags behind manoeuvres.
+/// Default time constant of the estimate, s. An estimate with a shorter one follows the noise. An estimate with a longer one
+/// lags behind manoeuvres.
 pub(crate) const TIME_CONSTANT_S: f64 = 0.3;
-/// Default limit of the relative prediction error at which planning uses the model. In still air `params/x8/learned`
+/// Default of the largest relative prediction error at which planning uses the model. In still air `params/x8/learned`
 /// stays below it and `prior-as-printed` almost always exceeds it (`results/notes/2026-11-27-learned-models.md`).
 pub(crate) const TRUST: f64 = 0.5;
 /// Averaging time of the squared prediction errors and measured changes, s: a few periods of the short-period mode.
 const MEMORY_S: f64 = 0.5;
 /// Averaging time of the regression of prediction errors on predictions, s. Gusts average out over this time.
 const SLOPE_MEMORY_S: f64 = 2.0;
-/// Magnitude of the regression slope of the error on the prediction beyond which the model is rejected. The slope is near
-/// 0 in gusts, and −1 if the predicted change did not happen at all. `docs/validation/controllers.md` has values in
-/// turbulence for right and wrong models.
+/// Largest accepted magnitude of the regression slope of the prediction error on the predicted change. With a larger slope
+/// the model is rejected. The slope is near 0 in gusts, and −1 if the predicted change did not happen at all.
+/// `docs/validation/controllers.md` has values in turbulence for right and wrong models.
 const SLOPE: f64 = 0.7;
-/// Scale of the accelerations below which the comparison shows no model error, in x_c (eq. 21) per second: calm flight.
+/// Size of the changes in calm flight, in x_c (eq. 21) per second. The error is compared with the motion plus this size. Calm
+/// flight therefore does not show a model error.
 const CALM: f64 = 0.02;
 
 /// Recursive estimate of the disturbance and of the model's prediction error.
@@ -72,7 +74,7 @@ impl Disturbance {
             - std::f64::consts::PI;
         let step = seen.state.advance(&last.state, -1.0);
         self.compare(model, &error.advance(&self.rate, -STEP), &step);
-        // e is the deviation from the model's prediction after one step, and e / STEP is the corresponding rate
+        // `error` is the deviation from the model's prediction after one step, and `error` / STEP is the corresponding rate
         let part = STEP / self.time_constant;
         let moved = self.rate.advance(&self.rate, -part).advance(&error, part / STEP);
         if moved.is_finite() {
@@ -84,7 +86,7 @@ impl Disturbance {
 
     /// Updates the error statistics with one step's prediction error `missed` and measured change `happened`.
     fn compare(&mut self, model: &GreyBox, missed: &State, happened: &State) {
-        // only rates and flow angles, in x_c per second: attitude and airspeed are their integrals
+        // only body rates and flow angles are compared, in x_c per second: attitude and airspeed are their integrals
         let scale = model.scale();
         let scaled = |change: &State| -> [f64; 5] {
             let change = change.to_array();
@@ -108,9 +110,9 @@ impl Disturbance {
         follow(&mut self.slope[1], predicted, SLOPE_MEMORY_S);
     }
 
-    /// Whether planning must not use the model. Two conditions must hold: the root-mean-square prediction error of the last
-    /// half second exceeds the fraction `most` of the motion, and the error is correlated with the prediction. The
-    /// correlation excludes gusts, which no model predicts.
+    /// Whether planning must not use the model. The result is true if two conditions hold: the root-mean-square prediction error
+    /// of the last half second exceeds the fraction `most` of the motion, and the error is correlated with the prediction. The
+    /// second condition excludes gusts, which no model predicts.
     pub fn is_wrong(&self, most: f64) -> bool {
         let part = (self.missed / (self.happened + CALM * CALM)).sqrt();
         let [product, predicted] = self.slope;
@@ -137,7 +139,7 @@ mod tests {
     use std::path::Path;
     use std::time::Duration;
 
-    /// A constant moment that the model lacks is found in the pitch rate only.
+    /// A constant pitch acceleration that the model lacks appears only in the pitch-rate component of the estimate.
     #[test]
     fn a_constant_rate_is_found() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/prior.toml");
@@ -171,8 +173,8 @@ mod tests {
         assert_eq!(disturbance.rate(), found);
     }
 
-    /// The estimate after 10 s of flight with `truth`, predicted by `model`. Aileron and elevator move, and at each step random
-    /// gusts change the rates by up to `gust` (rad/s).
+    /// The estimate of `model`'s errors after 10 s of simulated flight with the model `truth`. Aileron and elevator move. At each
+    /// step random gusts change the body rates by up to `gust` (rad/s).
     fn predicted(model: &str, truth: &str, gust: f64) -> Disturbance {
         let load = |name: &str| {
             let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8").join(name);

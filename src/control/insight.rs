@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-/// Roll and pitch (rad) of a simulated aircraft, at the present and after each step.
+/// Roll and pitch (rad) of a simulated aircraft at the present time and after each step.
 pub type Path = Vec<[f64; 2]>;
 
 /// One tick of a planner.

@@ -4,15 +4,15 @@ use crate::{Controller, Observation, Overruled, Target};
 use greylag_model::STEP;
 use greylag_physics::Command;
 
-/// Gains of one loop: output = trim + kp·e + ki·∫e − kd·rate. They are in units of the output (rad of surface, or throttle)
-/// per unit of the error (rad, or m/s).
+/// Gains of one loop: output = trim + kp·e + ki·∫e − kd·rate. The output is a surface deflection (rad) or the throttle (0..1).
+/// The error e is in rad or m/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
     /// Proportional gain on the error.
     pub kp: f64,
     /// Integral gain on the error, output per unit of the error and second.
     pub ki: f64,
-    /// Gain on the measured body rate, output per rad/s, with a negative sign in the law. Zero in the airspeed loop.
+    /// Gain on the measured body rate, output per rad/s. The law subtracts this term. Zero in the airspeed loop.
     pub kd: f64,
 }
 
@@ -46,8 +46,8 @@ pub enum Windup {
     Clamped,
 }
 
-/// Gains published with the simulator FW-JSBGym, the baseline of comparisons. They are from its latest `pid_eval`, read in
-/// 2026. An earlier version had 1.0, 0, 0.5 for roll and −4, −0.75, −0.1 for pitch.
+/// Gains published with the simulator FW-JSBGym, the baseline of comparisons. They are from the version of its `pid_eval` that
+/// was the latest in 2026. An earlier version had 1.0, 0, 0.5 for roll and −4, −0.75, −0.1 for pitch.
 pub const PUBLIC: Tuning = Tuning {
     name: "pid",
     roll: Gains { kp: 1.5, ki: 0.1, kd: 0.1 },

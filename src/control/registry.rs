@@ -89,7 +89,7 @@ impl<'a> Source<'a> {
         self.planner_over(None, name, settings)
     }
 
-    /// A planner with the model's LQI as base controller. Without a policy the search starts from the LQI's plan only.
+    /// A planner with the model's LQI as base controller. Without a policy, the search starts only from the LQI's plan.
     fn planner_over_lqi(
         &self,
         name: &'static str,

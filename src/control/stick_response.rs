@@ -19,8 +19,8 @@ pub struct StickResponse {
     pub states: Vec<State>,
 }
 
-/// Responses to a step of a quarter of full aileron (roll right), then of full elevator (nose up). They start from straight
-/// flight at the cruise airspeed. The servos are ideal.
+/// The response to a quarter of full aileron (roll right), then that to a quarter of full elevator (nose up). The responses
+/// start from straight flight at the cruise airspeed. The servos are ideal.
 ///
 /// # Errors
 ///

@@ -13,11 +13,11 @@ use greylag_physics::{Command, Time};
 const STEP_MS: usize = 4;
 /// Largest simulated delay, ms. A loop that is stable with this delay has enough margin.
 const LONGEST_MS: usize = 120;
-/// Length of a simulation, ticks.
+/// Length of a simulation in ticks of 10 ms.
 const TICKS: usize = 1000;
-/// Ticks of the full-deflection pulse: 0.1 s, beginning after 1 s.
+/// Ticks with a pulse of full deflection, which begins after 1 s and lasts 0.1 s.
 const PULSE: std::ops::Range<usize> = 100..110;
-/// First evaluated tick: only the last 2 s of a simulation count, as in JSBSim with `examples/delay_margin.rs`.
+/// First evaluated tick. The last 2 s of a simulation are evaluated, as `examples/delay_margin.rs` does with JSBSim.
 const END: usize = 800;
 /// Peak-to-peak rate at the end of a simulation above which the loop oscillates, rad/s (10 °/s).
 const SWING: f64 = 0.17;
@@ -28,8 +28,9 @@ const TICK_MS: usize = 10;
 /// starts in level flight at the cruise airspeed and applies a pulse of full deflection. `None` if the loops are stable
 /// up to 0.12 s.
 ///
-/// Surface positions are computed from undelayed commands, because a real flight controller does not report them.
-/// The search takes about a second for a controller that computes its command in microseconds.
+/// The controller receives surface positions that are computed from the undelayed commands. A real flight controller
+/// does not report positions either. The search takes about a second for a controller that computes its command in
+/// microseconds.
 ///
 /// # Errors
 /// If the model has no trim at the cruise airspeed. The delay margin is then unknown.
@@ -37,7 +38,7 @@ pub fn delay_margin(
     controller: &dyn Controller,
     model: &GreyBox,
 ) -> Result<Option<Duration>, TrimError> {
-    // JSBSim's Euler steps delay the attitude by one cycle, unlike an aircraft
+    // RK4, because Euler steps as in JSBSim delay the attitude by one cycle, unlike an aircraft
     let model = &{
         let mut continuous = model.clone();
         continuous.integrator = Integrator::Rk4;
@@ -129,8 +130,8 @@ fn surface(command: &mut Command, axis: Axis) -> &mut f64 {
     }
 }
 
-/// The command at the actuators: one surface is delayed, the others are not. A fraction of a cycle is interpolated
-/// linearly between two commands.
+/// The command at the actuators: `now`, but with the surface of `axis` delayed by `delay_ms`. `late` holds the latest
+/// commands, the newest last. A delay by a fraction of a cycle interpolates linearly between two of them.
 fn delayed(late: &VecDeque<Command>, now: Command, axis: Axis, delay_ms: usize) -> Command {
     let (whole, share) = (delay_ms / TICK_MS, (delay_ms % TICK_MS) as f64 / TICK_MS as f64);
     let newest = late.len() - 1;
@@ -178,8 +179,8 @@ mod tests {
 
     #[test]
     fn the_model_says_of_delay_what_the_official_simulator_does() {
-        // JSBSim with steps of 1 ms oscillates after a pulse of full deflection: with `lqi` from 46 ms on, in pitch;
-        // with `lqi-damped` from 104 ms on (`examples/delay_margin.rs`).
+        // In JSBSim with steps of 1 ms, the loop oscillates after a pulse of full deflection from a delay of 46 ms on
+        // with `lqi` (in pitch), and from 104 ms on with `lqi-damped` (`examples/delay_margin.rs`).
         let model = x8();
         let margin = |kind| {
             let margin = delay_margin(build(kind, &model).unwrap().as_ref(), &model).unwrap();

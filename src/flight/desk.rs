@@ -1,7 +1,7 @@
 //! The companion as a function of received bytes and time, without threads, sockets or a wall clock.
 //!
-//! It runs the same pilot, vehicle link and controller as [`runtime`](super::runtime). It serves campaigns of thousands
-//! of flights in one process, and replays.
+//! It runs the same pilot, vehicle link and controller as [`runtime`](super::runtime). Fault campaigns use it to fly
+//! thousands of flights in one process.
 
 use std::time::Duration;
 

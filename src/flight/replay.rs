@@ -83,7 +83,8 @@ struct States {
 }
 
 impl States {
-    /// The state of vehicle time `time`. Earlier states without a call arrived late and are skipped.
+    /// The state of vehicle time `time` with its arrival time; `None` if the telemetry has no such state. Earlier
+    /// states are skipped, because the recording has no call for them.
     fn next(&mut self, time: Time) -> Option<(Duration, Telemetry)> {
         loop {
             while let Some((host, state)) = self.ready.pop_front() {
@@ -146,7 +147,8 @@ pub fn replay(
     replay_watched(folder, companion, vehicle, &mut |_, _, _| ())
 }
 
-/// Callback for each planned tick of a replay: time, request, and the controller after its command.
+/// Callback for each planned tick of a replay. Its arguments are the vehicle time, the request, and the controller
+/// after it has computed its command.
 pub type Watch<'a> = dyn FnMut(Time, &Request, &dyn Controller) + 'a;
 
 /// Replays like [`replay`], and calls `watch` for each planned tick.
@@ -230,7 +232,7 @@ impl Replayed<'_, '_> {
             return !ended;
         };
         let request = self.companion.pilot.observe(state.time, &state);
-        // a busy planner did not receive the request, and a controller that has ended gave no answer
+        // in flight, a planner that was busy or had ended did not process the request
         let heard = request.filter(|_| !matches!(planned, Planned::Busy | Planned::None));
         if heard.is_none() {
             self.owed |= request.is_some_and(|request| request.engage);
@@ -253,7 +255,7 @@ impl Replayed<'_, '_> {
             Planned::None => Plan::None,
         };
         let decision = self.companion.pilot.decide(plan);
-        // The vehicle link of a flight controller models the actuators from the commands that were sent.
+        // The link to a flight controller estimates the actuator positions from the commands that were sent.
         self.states.vehicle.answer(host, state.time, &decision.demand());
         self.outcome.ticks += 1;
         if !same(&decision.command, &recorded) {

@@ -2,9 +2,11 @@
 
 /// State of Adam (Kingma and Ba, 2015, algorithm 1) for a list of parameters.
 ///
-/// burn's Adam requires the parameters in burn's tensors. A kernel of this crate updates these parameters 500 times a
-/// second. A resumed training must be equal to the bit. Copying the parameters to tensors would take more code than the
-/// algorithm. A test compares the algorithm with a case calculated by hand.
+/// burn's Adam requires the parameters in burn's tensors. The training of the dynamics keeps them in plain arrays and
+/// updates them 500 times a second. Copying them to tensors would take more code than the algorithm. A test compares
+/// the algorithm with a case calculated by hand.
+///
+/// The state is public because a checkpoint stores it. A resumed training must equal an uninterrupted one to the bit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Adam {
     /// Running means of the gradients.
@@ -49,10 +51,10 @@ mod tests {
     fn moves_as_the_algorithm_says() {
         let mut adam = Adam::new(1);
         adam.begin();
-        // the first move is the learning rate, whatever the gradient
+        // the first step has the size of the learning rate for any gradient
         assert!((adam.move_of(0, 3.0, 0.1) + 0.1).abs() < 1e-9);
         adam.begin();
-        // m = 0.9·0.3 − 0.1 = 0.17, over 0.19; v = 0.999·0.009 + 0.001 = 0.009991, over 0.001999
+        // m = 0.9·0.3 − 0.1 = 0.17, divided by 0.19; v = 0.999·0.009 + 0.001 = 0.009991, divided by 0.001999
         let expected = -0.1 * (0.17 / 0.19) / (0.009991_f64 / 0.001999).sqrt();
         assert!((adam.move_of(0, -1.0, 0.1) - expected).abs() < 1e-9);
     }

@@ -16,11 +16,11 @@ pub struct Checkpoint {
     pub identity: String,
     /// Parameters of the network.
     pub network: Vec<f32>,
-    /// Coordinates of the prior.
+    /// Coordinates of the trained coefficients of the prior.
     pub coordinates: Vec<f64>,
     /// State of the optimiser.
     pub adam: Adam,
-    /// λ of eq. (24).
+    /// λ of eq. (24) of \[GSFM26\]: the penalty on the residual is divided by it.
     pub lambda: f64,
     /// Number of updates made.
     pub update: u64,
@@ -47,14 +47,14 @@ pub enum CheckpointError {
         /// Description of the invalid content.
         why: String,
     },
-    /// The checkpoint is that of another training.
+    /// The checkpoint belongs to another training.
     #[error(
         "the checkpoint is of a training with other options, another prior or other flights; give the same ones, or another --out"
     )]
     Other,
 }
 
-/// The scalars of a checkpoint, the only entry of the metadata.
+/// The scalars of a checkpoint. They are the only entry of the file's metadata.
 #[derive(Serialize, Deserialize)]
 struct Header {
     schema: String,
@@ -70,7 +70,7 @@ const METADATA: &str = "greylag";
 
 impl Checkpoint {
     /// Checks that the checkpoint belongs to the training `identity`. The training has `parameters` parameters, of
-    /// which `coordinates` are the prior's.
+    /// which `coordinates` are coordinates of the prior.
     ///
     /// # Errors
     ///

@@ -11,7 +11,7 @@ use thiserror::Error;
 pub struct HostPort {
     /// Host name, IPv4 address, or IPv6 address without its brackets.
     pub host: String,
-    /// Port number, 1..65535. Tests use 0, with which the system chooses a free port.
+    /// Port number, 1..65535. With 0, which tests use, the system chooses a free port.
     pub port: u16,
 }
 

@@ -35,7 +35,7 @@ pub struct AttitudeSetpoint {
     pub roll: f64,
     /// Commanded pitch, rad, not yet limited to the envelope.
     pub pitch: f64,
-    /// Commanded thrust, 0..1; `None` if the sender masked it.
+    /// Commanded thrust, 0..1; `None` if the sender's type mask excludes it.
     pub thrust: Option<f64>,
 }
 
@@ -123,8 +123,8 @@ pub struct Status {
     pub actuators: ActuatorState,
     /// Recent processing time of the control task as a fraction of its 10 ms cycle, 0..1.
     pub load: f64,
-    /// Model residuals (measured minus predicted) divided by the half width of their bands, two standard deviations
-    /// (see `flight::monitor`), in the order of [`RESIDUALS`]. They are dimensionless. Beyond −1..1 a residual is
+    /// Model residuals (measured minus predicted) in the order of [`RESIDUALS`]. Each is divided by the half width of
+    /// its band, two standard deviations (see `flight::monitor`), and is dimensionless. Beyond −1..1 a residual is
     /// outside its band.
     pub residuals: [f64; 6],
     /// Dimensional derivatives of the aircraft at its cruise airspeed, estimated in flight, in the order of

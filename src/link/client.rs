@@ -38,9 +38,9 @@ const DISPLACEABLE: Duration = Duration::from_secs(3);
 const FORGOTTEN: Duration = Duration::from_secs(60);
 /// Largest number of texts fetched from the autopilot per call of `poll`.
 const TEXTS_PER_POLL: usize = 8;
-/// Longest text that is sent, in characters: eight chunks.
+/// Longest text that is sent, in characters: eight chunks of 50.
 const TEXT_LENGTH: usize = 400;
-/// End of a text that was cut. STATUSTEXT holds ASCII.
+/// Ending of a text that was shortened. STATUSTEXT allows ASCII only.
 const CUT: &str = "...";
 
 /// Host time and vehicle time at a call.
@@ -111,8 +111,8 @@ impl Clients {
         }
     }
 
-    /// A server for the onboard computer of a controller that has not been received yet. It serves only requests to
-    /// this component, and streams only on request.
+    /// A server for the onboard computer of a flight controller whose system id is not known yet. It serves only
+    /// requests to this component, and streams only on request.
     pub fn onboard() -> Self {
         let identity = Source { system: 1, component: ONBOARD };
         Clients { role: Role::Onboard, ..Clients::new(identity) }
@@ -210,7 +210,8 @@ impl Clients {
         }
     }
 
-    /// Opens a session. If all sessions are in use, it replaces the session with the longest silence.
+    /// Opens a session and returns its index. If all sessions are in use, it replaces the session with the longest
+    /// silence; `None` if no session may be replaced.
     fn admit(&mut self, now: Now, peer: PeerId, stay: Stay) -> Option<usize> {
         if self.sessions.len() >= MAX_SESSIONS {
             let silent = |s: &Session| now.host.saturating_sub(s.heard);
@@ -225,7 +226,7 @@ impl Clients {
         }
         let mut session = Session::new(peer, stay, now.host);
         if self.role == Role::Onboard {
-            // Group 0 contains all default streams.
+            // Turns off group 0, which contains all default streams.
             session.streams.set_group(0, None, now.host);
         }
         self.sessions.push(session);
@@ -260,7 +261,7 @@ impl Clients {
                 self.set_parameter(now, at, from, name, value, autopilot)
             }
             Request::Mission { step, kind } => self.reply(at, &mission(step, kind, from)),
-            // a reply must not be answered: 128 is ACK, 129 NAK
+            // a reply must not be answered: opcode 128 is ACK, 129 is NAK
             Request::File { opcode: 128 | 129, .. } => {}
             Request::File { sequence, session, opcode } => {
                 self.reply(at, &answer::file_nak(sequence, session, opcode, from));

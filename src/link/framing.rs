@@ -2,7 +2,7 @@
 //!
 //! [`Frames`] parses a datagram, [`StreamCutter`] a byte stream. Both accept MAVLink 1 and 2 and check the CRC. After
 //! bytes that are not a frame they resynchronise on the next start marker. Signed frames (incompatibility flag 0x01)
-//! are accepted without a check of the signature, which `signing::Signer::believed` does. Frames with any other
+//! are accepted without a check of the signature; `signing::Signer::believed` checks it. Frames with any other
 //! incompatibility flag are refused, as the MAVLink guide requires.
 
 mod checksum;
@@ -24,10 +24,11 @@ const SIGNATURE: usize = 13;
 const FLAG_SIGNED: u8 = 0x01;
 /// Length of the longest frame, bytes: MAVLink 2 with full payload and signature.
 pub const MAX_FRAME: usize = HEADER_V2 + 255 + CHECKSUM + SIGNATURE;
-/// Number of false starts in one datagram or chunk after which the rest is dropped. Each costs a CRC over up to 267
-/// bytes. The limit bounds the time for noise to a few microseconds.
+/// Number of false starts in one datagram or chunk after which the rest is dropped. A false start is a start marker
+/// without a valid frame. Each costs a CRC over up to 267 bytes. The limit bounds the time for noise to a few
+/// microseconds.
 const MAX_FALSE_STARTS: u32 = 32;
-/// Largest number of frames from one datagram or chunk. Senders pack to an MTU, which holds fewer.
+/// Largest number of frames from one datagram or chunk. A datagram of one MTU holds fewer.
 const MAX_FRAMES: u32 = 128;
 
 /// MAVLink protocol version of a frame.
@@ -67,7 +68,7 @@ pub struct Frame<'a> {
     pub bytes: &'a [u8],
 }
 
-/// Counters of parsed frames.
+/// Counters of parsed frames. A candidate is a start marker with the bytes after it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrameCounts {
     /// Complete frames with a valid CRC.

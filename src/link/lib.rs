@@ -21,7 +21,7 @@
 //!
 //! fn serve(pilot: &mut dyn Autopilot) -> Result<(), Box<dyn std::error::Error>> {
 //!     let network = Network::start()?;
-//!     // A channel of its own for the vehicle, so that it can be served first.
+//!     // The vehicle has its own channel and can therefore be served first.
 //!     let (to_vehicle, from_vehicle) = bounded(256);
 //!     let (to_clients, from_clients) = bounded(1024);
 //!     let vehicle_link =
@@ -41,7 +41,7 @@
 //!                 let mut newest = None;
 //!                 vehicle.handle(start.elapsed(), packet.peer, &packet.bytes, |t| newest = Some(t));
 //!                 if let Some(state) = newest {
-//!                     now.vehicle = state.time; // … and the pilot decides what to answer.
+//!                     now.vehicle = state.time; // Here the pilot decides on the demand.
 //!                     let demand =
 //!                         Demand { outputs: Outputs::Disarmed, attitude: [0.0; 2], fault: None };
 //!                     let frame = vehicle.answer(start.elapsed(), state.time, &demand);

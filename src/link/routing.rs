@@ -1,6 +1,6 @@
 //! Routing between clients and a flight controller.
 //!
-//! Frames for other components are forwarded unmodified to the peer from which their target was received.
+//! Frames for other components are forwarded unmodified to the peer from which frames of their target were received.
 
 use std::time::Duration;
 
@@ -16,15 +16,16 @@ const FORGOTTEN: Duration = Duration::from_secs(60);
 /// Destination of a client's frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
-    /// The frame is forwarded to the controller.
+    /// The frame is forwarded to the flight controller.
     Controller,
     /// The frame is only handled by this program.
     Ours,
-    /// The frame is dropped: it would override the holder of control authority, or disclose a signing key.
+    /// The frame is dropped: it carries this program's ids, would override the holder of control authority, or would
+    /// disclose a signing key.
     Nowhere,
 }
 
-/// The routing table: from which peer each system and component was received.
+/// The routing table: the peers from which frames of each system and component were received.
 #[derive(Clone, Debug, Default)]
 pub struct Router {
     routes: Vec<(Source, PeerId, Duration)>,
@@ -66,8 +67,8 @@ impl Router {
         on
     }
 
-    /// The frames of the controller that are forwarded to `peer`: broadcasts, and frames for a system that was received
-    /// from `peer`. A signing key is never forwarded.
+    /// The frames of the controller that are forwarded to `peer`: broadcasts, and frames for a system and component
+    /// from which `peer` has delivered frames. A signing key is never forwarded.
     pub fn to_client(&self, bytes: &[u8], peer: PeerId) -> Vec<u8> {
         let mut on = Vec::new();
         pieces(bytes, |bytes, frame| {
@@ -94,7 +95,7 @@ impl Router {
 
 /// Destination of a client's frame.
 pub fn way(frame: Option<&Frame<'_>>, us: Source, engaged: bool) -> Way {
-    // this program does not handle unknown messages
+    // unknown messages cannot be decoded and are forwarded
     let Some(frame) = frame else { return Way::Controller };
     if frame.source == us || frame.id == wire::SETUP_SIGNING {
         return Way::Nowhere;

@@ -1,8 +1,8 @@
 //! MAVLink 2 message signing: signs outgoing frames and verifies received frames.
 //!
 //! According to the MAVLink guide, the signature is the first 48 bits of the SHA-256 of key, frame, link id and
-//! timestamp. Timestamps (10 µs since 2015) increase in each stream of a sender. The codec's signing is not used,
-//! because its timestamp cannot be read and stored for the next start.
+//! timestamp. Timestamps (units of 10 µs since 2015) increase in each stream of a sender. The signing of the crate
+//! `mavlink` is not used, because its timestamp cannot be read and stored for the next start.
 
 mod key;
 mod stamp;
@@ -26,7 +26,7 @@ const CHECKSUM: usize = 2;
 const BLOCK: usize = 13;
 /// Length of the signature field in bytes.
 const SIGNATURE: usize = 6;
-/// Largest lag of the first timestamp of a new stream: 1 min, in units of 10 µs.
+/// Largest lag of the first timestamp of a new stream behind the newest timestamp: 1 min, in units of 10 µs.
 const MINUTE: u64 = 6_000_000;
 /// Largest number of streams that are remembered. Only a holder of the key can add a stream.
 const MAX_STREAMS: usize = 1024;
@@ -103,7 +103,7 @@ impl Signer {
         signed
     }
 
-    /// Appends an unsigned MAVLink 2 frame with its signature.
+    /// Signs an unsigned MAVLink 2 frame and appends it to `out`.
     fn put(&mut self, unix_us: u64, link: u8, frame: &[u8], out: &mut Vec<u8>) {
         self.stamp = (self.stamp + 1).max(stamp_of(unix_us)).min(STAMP_MAX);
         let from = out.len();

@@ -30,8 +30,8 @@ pub struct Telemetry {
     pub time: Time,
     /// Order relative to the previous state frame.
     pub order: Order,
-    /// Invalid parts of the state. Such a part keeps its last valid value, or the neutral value before the first valid
-    /// one.
+    /// Invalid parts of the state. Such a part keeps its last valid value. Before the first valid value it has a
+    /// neutral value.
     pub faults: Faults,
     /// The eight state variables: airspeed, flow angles, roll, pitch and body rates.
     pub state: State,
@@ -39,7 +39,7 @@ pub struct Telemetry {
     pub incidence_sd: [f64; 2],
     /// Yaw angle ψ, rad.
     pub yaw: f64,
-    /// Hold time of the body rates, s. A simulator keeps them constant over its step; 0 for rates sampled at the
+    /// Time for which the source holds the body rates constant, s: the step of a simulator. 0 for rates sampled at the
     /// instant.
     pub rate_hold_s: f64,
     /// Specific force along body x, y, z (forward, right, down), m/s².
@@ -69,7 +69,7 @@ pub enum Order {
     /// The previous frame again. A simulator in lockstep repeats a frame until it gets a reply. The frame needs a reply
     /// but must not be processed again.
     Repeated,
-    /// A frame older than a delivered one, which must be ignored.
+    /// A frame older than the newest delivered frame. It must be ignored.
     Late,
 }
 
@@ -153,8 +153,8 @@ impl Vehicle {
         }
     }
 
-    /// Excludes `missed`, a stall of this computer, from all timeouts. Frames sent during the stall may still be in the
-    /// receive buffer.
+    /// Excludes `missed`, the length of a stall of this computer, from all timeouts: frames sent during the stall may
+    /// still be in the receive buffer.
     pub fn excuse(&mut self, missed: Duration) {
         match self {
             Vehicle::Sitl(_) => {}
@@ -162,7 +162,8 @@ impl Vehicle {
         }
     }
 
-    /// Whether the commands are surface deflections that pass through a flight controller. Their signs must be checked.
+    /// Whether the commands are surface deflections that pass through a flight controller. Their signs must then be
+    /// checked.
     pub fn has_channels(&self) -> bool {
         match self {
             Vehicle::Sitl(_) => false,

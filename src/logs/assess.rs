@@ -1,4 +1,4 @@
-//! Assessment of a log's channels: which are too slow or stuck to be used, and the findings about them.
+//! Assessment of a log's channels: which are too slow or frozen, and the findings about them.
 
 use super::Sample;
 use super::columns::{COLUMNS, index};
@@ -33,12 +33,12 @@ pub(super) fn real_hz(channel: &Channel) -> f64 {
     }
 }
 
-/// Whether a channel is sampled too slowly for a study, with the rate that is needed, Hz.
+/// The required rate, Hz, if a channel is too slow for `column`; `None` if it is fast enough.
 pub(super) fn too_slow(channel: &Channel, column: &str) -> Option<f64> {
     wanted_hz(column).filter(|wanted| real_hz(channel) < SLACK * wanted)
 }
 
-/// Findings about the channels: interpolated samples, and spikes of a log with a flight.
+/// Findings about interpolated samples, and about spikes if the log has a flight.
 pub(super) fn channels(channels: &[Channel], rows: &[Sample], flies: &Flying) -> Vec<Finding> {
     let lines = |wrong: bool| -> Vec<String> {
         let lines = channels.iter().filter(|c| c.quality.interpolated);
@@ -77,7 +77,7 @@ pub(super) fn channels(channels: &[Channel], rows: &[Sample], flies: &Flying) ->
     out
 }
 
-/// Sets the rows of a channel that is stuck in flight to NaN; one finding for each stuck channel.
+/// Sets values that are frozen in flight to NaN. Returns one finding for each frozen channel.
 pub(super) fn freeze(rows: &mut [Sample], channels: &[Channel], flies: &Flying) -> Vec<Finding> {
     let flights: Vec<(f64, f64)> = phases::phases(rows, flies)
         .into_iter()
@@ -108,10 +108,11 @@ pub(super) fn freeze(rows: &mut [Sample], channels: &[Channel], flies: &Flying) 
     out
 }
 
-/// Columns whose frozen values make a row unusable; the airspeed may be slow or missing for a while.
+/// Columns whose frozen values make a row unusable. The airspeed is not among them, because it may be missing for a
+/// while.
 const OF_A_ROW: [&str; 5] = ["roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps"];
 
-/// Whether the row lacks a required column because its channel is stuck.
+/// Whether the row lacks a required column because its channel is frozen.
 pub(super) fn hangs(row: &Sample, channels: &[Channel]) -> bool {
     let hanging = channels.iter().filter(|c| !c.quality.frozen.is_empty());
     hanging

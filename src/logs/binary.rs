@@ -1,4 +1,4 @@
-//! Reads the topics of a binary log onto one table and checks it.
+//! Resamples the topics of a binary log onto one table and checks it.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use super::{Flight, FlowAngles, Format, Sample, assess, derive, rows, screening,
 /// The log made from `topics`. `path` appears in errors, `name` is the name of the flight.
 ///
 /// # Errors
-/// It lacks a needed column, has too many unusable rows, or is of a vehicle without wings.
+/// The log lacks a required column, has too many unusable rows, or is of a vehicle without wings.
 pub(super) fn read(
     format: Format,
     mut topics: Topics,
@@ -29,7 +29,7 @@ pub(super) fn read(
     let mut findings = refused(vehicle.as_ref(), path, to)?;
     let no_wings = !findings.is_empty();
     let mut table = table::build(&topics, &o.mapping.rules(format, &topics), &o.sources);
-    // A long log must not be in memory twice.
+    // The topics are freed, because a long log must not be in memory twice.
     topics.topics.clear();
     let flies = Flying { bridged_s: bridged_s(&table), ..o.flies };
     let stretches = table.whole.take().map(|whole| of_all(whole, &hovers, &o.flies));
@@ -77,14 +77,15 @@ pub(super) fn read(
     })
 }
 
-/// Longest time between the stretches that are kept, s; 0 if the whole log is kept.
+/// An inspection keeps only stretches of a long log. Returns the longest time between them, s; 0 if the whole log is
+/// kept.
 fn bridged_s(table: &table::Table) -> f64 {
     let Some(whole) = &table.whole else { return 0.0 };
     let step = |w: &[Sample]| w[1].time_s - w[0].time_s;
     table.rows.windows(2).map(step).fold(0.0, f64::max).max(whole.stretches.length_s) + 1.0
 }
 
-/// The stretches with the phases of the whole log without the `hovers` (start and end, s).
+/// Adds the phases of the whole log to the stretches. The `hovers` (start and end, s) are left out.
 fn of_all(mut whole: table::Whole, hovers: &[(f64, f64)], flies: &Flying) -> Stretches {
     whole.air.retain(|s| !hovers.iter().any(|(from, to)| (*from..*to).contains(&s.time_s)));
     let mut phases = phases::phases(&whole.air, flies);
@@ -94,7 +95,7 @@ fn of_all(mut whole: table::Whole, hovers: &[(f64, f64)], flies: &Flying) -> Str
     Stretches { phases, ..whole.stretches }
 }
 
-/// Findings on the rows of wing-borne flight; `hovers` (start and end, s) are the other flight.
+/// Findings on the rows of wing-borne flight. `hovers` (start and end, s) are the intervals outside it.
 fn on_wings(rows: &[Sample], hovers: &[(f64, f64)], flies: &Flying) -> Vec<Finding> {
     match rows.is_empty() && !hovers.is_empty() {
         true => vec![Finding::problem(NEVER_ON_WINGS)],
@@ -113,7 +114,8 @@ fn refused(vehicle: Option<&Vehicle>, path: &Path, to: Use) -> Result<Vec<Findin
     }
 }
 
-/// Required columns without data. The first one is an error if the log is to be used in a computation.
+/// Findings about required columns without data. If the log is used for computation, the first such column is an
+/// error.
 fn lacking(
     table: &table::Table,
     topics: &Topics,
@@ -146,7 +148,7 @@ fn lacking(
     }
 }
 
-/// Removes the rows outside wing-borne flight.
+/// Removes the rows outside wing-borne flight. Returns a finding about them.
 fn grounded(
     rows: &mut Vec<Sample>,
     hovers: &[(f64, f64)],
@@ -172,7 +174,8 @@ fn near_degree(gain: f64) -> bool {
     (gain.abs() / 1_f64.to_radians() - 1.0).abs() < 0.01
 }
 
-/// A finding whose cure names the topic and the factor that the reader uses in place of the table's column.
+/// Rewrites the correction of a finding. The text then names the topic and field that the reader uses, and the whole
+/// factor.
 fn named(finding: Finding, rules: &[Rule], o: &Options) -> Finding {
     let Some(cure) = &finding.cure else { return finding };
     let rule = rules.iter().find(|r| r.columns()[0] == cure.column && r.factor().is_some());
@@ -215,7 +218,8 @@ fn flow_angles(format: Format, o: &Options) -> FlowAngles {
     }
 }
 
-/// The rows of the flight; an error or a finding if too few rows are usable.
+/// Returns the usable rows of the flight. Too few of them are an error for a computation, and a finding for an
+/// inspection.
 fn kept(
     table: &mut table::Table,
     path: &Path,
@@ -240,7 +244,7 @@ fn kept(
     Ok(visible(&table.rows))
 }
 
-/// Selection of the rows that a computation can use.
+/// An empty table for usable rows. If the airspeed is missing in some of them, columns of slow sensors may be empty.
 fn usable(samples: &[Sample]) -> rows::Rows {
     let hangs = samples.iter().any(|s| s.airspeed_mps.is_nan());
     match hangs {
@@ -274,7 +278,7 @@ fn either(missing: &table::Missing) -> String {
     }
 }
 
-/// Records that would fill the column, in words.
+/// Advice on which records to log for the column, in words.
 fn would_fill(topics: &Topics, missing: &table::Missing) -> String {
     match (missing.looked_for.is_empty(), topics.naming) {
         (true, Naming::Sender) if missing.or.is_some() => "record SERVO_OUTPUT_RAW with the parameters SERVOn_FUNCTION, which say what each output moves".to_owned(),
@@ -284,7 +288,7 @@ fn would_fill(topics: &Topics, missing: &table::Missing) -> String {
     }
 }
 
-/// Content of the log, in words.
+/// The topics of the log, in words.
 fn holds(topics: &Topics) -> String {
     let mut has: Vec<&str> = topics.counts.keys().map(|(name, _)| name.as_str()).collect();
     has.dedup();

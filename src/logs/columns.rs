@@ -1,13 +1,13 @@
-//! The columns of the log format: their names, with their places in a sample.
+//! The columns of the log format: their names and their fields in a sample.
 
 use super::Sample;
 
-/// Reads a place in a sample.
+/// Reads the value of a column from a sample.
 pub(super) type Get = fn(&Sample) -> f64;
-/// Gives access to a place in a sample.
+/// Gives mutable access to the value of a column in a sample.
 pub(super) type Place = fn(&mut Sample) -> &mut f64;
 
-/// The columns of the format in the order they are written: name, value, place.
+/// The columns of the format in the order in which they are written: name, read access, mutable access.
 pub(super) const COLUMNS: [(&str, Get, Place); 29] = [
     ("time_s", |s| s.time_s, |s| &mut s.time_s),
     ("roll_rad", |s| s.attitude_rad[0], |s| &mut s.attitude_rad[0]),
@@ -39,25 +39,25 @@ pub(super) const COLUMNS: [(&str, Get, Place); 29] = [
     ("pitch_target_rad", |s| s.pitch_target_rad, |s| &mut s.pitch_target_rad),
     ("rate_hold_s", |s| s.rate_hold_s, |s| &mut s.rate_hold_s),
 ];
-/// Rows of a block. All columns of a block are read before those of the next one, so that the block stays in the
-/// processor's cache.
+/// Number of rows of a block. All columns of a block are read before those of the next block, so that the block stays
+/// in the processor's cache.
 pub(super) const BLOCK: usize = 512;
 /// Columns that a flight log must have.
 pub(super) const NEEDED: [&str; 7] =
     ["time_s", "roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps", "airspeed_mps"];
-/// For each actuator the command or the position must be there.
+/// Command and position of each actuator. A flight log must have one of the two.
 pub(super) const EITHER: [(&str, &str); 3] = [
     ("aileron_cmd", "aileron_rad"),
     ("elevator_cmd", "elevator_rad"),
     ("throttle_cmd", "throttle"),
 ];
 
-/// The place of a column in [`COLUMNS`].
+/// The index of the column `name` in [`COLUMNS`].
 pub(super) fn index(name: &str) -> Option<usize> {
     COLUMNS.iter().position(|c| c.0 == name)
 }
 
-/// Whether a column is a command, which holds until the next one.
+/// Whether a column is a command or a commanded angle. Its value holds until the next sample.
 pub(super) fn is_held(name: &str) -> bool {
     name.ends_with("_cmd") || name.ends_with("_target_rad")
 }

@@ -43,7 +43,7 @@ pub enum CsvError {
         /// Error of the CSV reader.
         source: ::csv::Error,
     },
-    /// A needed column is missing.
+    /// A required column is missing.
     #[error("flight log {path} has no column `{column}`: {remedy}")]
     Column {
         /// Path of the log.
@@ -53,7 +53,7 @@ pub enum CsvError {
         /// Remedy, in words.
         remedy: String,
     },
-    /// Too many rows cannot be used.
+    /// More than 5 % of the rows are unusable.
     #[error(
         "flight log {path}: {dropped} of {rows} rows are unusable ({reasons}; first: row {first}), above 5 %: repair it or read it leniently"
     )]
@@ -76,9 +76,10 @@ pub enum CsvError {
 pub struct Reading {
     /// The flight as read.
     pub flight: Flight,
-    /// Columns that the format does not name.
+    /// Columns of the file that the format does not name.
     pub unknown_columns: Vec<String>,
-    /// Rows dropped as out of order, repeated, non-finite where needed, or impossible.
+    /// Number of rows dropped because they are out of order, repeated, non-finite in a required column, or
+    /// impossible.
     pub dropped: usize,
     /// Numbers of the first dropped rows. The header is row 1.
     pub dropped_rows: Vec<usize>,
@@ -89,7 +90,7 @@ pub struct Reading {
 /// Reads a flight log from a file.
 ///
 /// # Errors
-/// The file cannot be read, a needed column is missing, or too many rows are unusable.
+/// The file cannot be read, a required column is missing, or too many rows are unusable.
 pub fn load(path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
     let fail = |source| CsvError::File { doing: "read", path: path.to_owned(), source };
     let mut bytes = Vec::new();
@@ -112,7 +113,7 @@ pub fn parse(bytes: &[u8], path: &Path, tolerance: Tolerance) -> Result<Reading,
     }
 }
 
-/// Drops the unusable rows. If they are too many, the error is returned beside the other rows.
+/// Drops the unusable rows. If there are too many of them, an error is returned beside the usable rows.
 pub(super) fn settle(
     mut raw: Raw,
     path: &Path,
@@ -131,7 +132,7 @@ pub(super) fn settle(
     (reading(raw, rows, path), error)
 }
 
-/// Keeps every row that is later than the last one, complete or not, for inspection of the table.
+/// Keeps every row that is later than the last kept one, complete or not, for inspection of the table.
 pub(super) fn keep_all(mut raw: Raw, path: &Path) -> Reading {
     let rows = raw.judged(|rows, number, row, kept| {
         let last = kept.last().map(|last| last.time_s);
@@ -170,7 +171,7 @@ mod tests {
     fn flown(rows: usize) -> Flight {
         let sample = |i: usize| {
             let mut sample = Sample { time_s: i as f64 * 0.01, ..Sample::default() };
-            // Every column a number of its own that no decimal fraction writes exactly.
+            // Each column gets its own number with many digits.
             for (k, column) in COLUMNS.iter().enumerate().skip(1) {
                 *column.2(&mut sample) = ((i + k) as f64).sin().abs() / 3.0;
             }
@@ -222,7 +223,7 @@ mod tests {
         flight.samples[20].airspeed_mps = -20.0;
         flight.samples[30].attitude_rad[0] = 4.0;
         let reading = read(&text(&flight)).unwrap();
-        // Row 1 is the header, so sample 10 stands in row 12.
+        // Row 1 is the header, so sample 10 is in row 12.
         assert_eq!(reading.dropped_rows, vec![12, 22, 32]);
         assert_eq!(reading.flight.samples.len(), 97);
         for i in 40..43 {

@@ -1,15 +1,15 @@
-//! ArduPilot DataFlash `.bin` read into topics.
+//! Reads ArduPilot DataFlash files (`.bin`) into topics.
 //!
-//! Written here because the crate falls short (`ardupilot-binlog` 0.2.0 looked at): a FMT record
-//! whose length is below 3 makes it panic, it ends silently after a number of consecutive errors
-//! so that a truncated log looks like a whole one, allocates a name and a list for every record,
-//! and knows no instances. The independent check is pymavlink (`tests/logs_crosscheck.py`).
+//! The crate `ardupilot-binlog` (0.2.0) is not used. A FMT record with a length below 3 makes it panic. It ends
+//! silently after a number of consecutive errors, so that a truncated log looks complete. It allocates a name and a
+//! list for every record, and does not distinguish instances. `tests/logs_crosscheck.py` compares the results with
+//! pymavlink.
 //!
-//! A step back in the time of the attitude or of the gyros begins another flight, because a card that is read as a
-//! whole holds one log after the other. The step back after a single damaged time does not.
+//! A backward step in the time of ATT or IMU begins another flight, because a copy of a whole card holds several logs
+//! in succession. The backward step after a single damaged time does not begin one.
 //!
-//! Not read: texts except the firmware's name, arrays (`a`), units and multipliers of FMTU and MULT (the format letters
-//! `c C e E L` carry their own scale, which is what pymavlink applies, too).
+//! Not read: texts except the firmware's name, arrays (`a`), and the units and multipliers of FMTU and MULT. The
+//! format letters `c C e E L` imply a scale, which pymavlink applies too.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -23,12 +23,12 @@ use super::window::Window;
 
 /// Length of a record's header: two magic bytes and the type.
 pub(super) const HEADER: usize = 3;
-/// The type of the record that declares types, its length, and that of its texts.
+/// Type number of the record FMT, which declares record types, and its length in bytes.
 pub(super) const FMT: u8 = 128;
 const FMT_LEN: usize = 89;
-/// The longest record; its length has one byte.
+/// Length of the longest record, bytes. The length of a record has one byte.
 const LONGEST: usize = 255;
-/// Records whose time shows where another flight begins, and the least step back, s.
+/// Record types in which a backward step of time begins another flight, and the smallest such step, s.
 const CLOCKS: [&str; 2] = ["ATT", "IMU"];
 const BACK_S: f64 = 1.0;
 
@@ -36,7 +36,7 @@ const BACK_S: f64 = 1.0;
 struct Declared {
     name: String,
     len: usize,
-    /// Label, format letter, offset behind the header.
+    /// Label, format letter and offset after the header (bytes) of each field.
     fields: Vec<(String, u8, usize)>,
     time: Option<(u8, usize, f64)>,
     instance: Option<(u8, usize)>,
@@ -108,7 +108,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(&bytes[..end]).trim().to_owned()
 }
 
-/// The declaration in the body of a FMT record; `None` if it contradicts itself.
+/// The type number and the declaration in the body of a FMT record; `None` if it contradicts itself.
 fn declaration(body: &[u8], wanted: &dyn Fn(&str) -> bool) -> Option<(u8, Declared)> {
     let (kind, len) = (*body.first()?, usize::from(*body.get(1)?));
     let (name, letters) = (text(body.get(2..6)?), text(body.get(6..22)?));
@@ -142,15 +142,15 @@ fn declaration(body: &[u8], wanted: &dyn Fn(&str) -> bool) -> Option<(u8, Declar
 
 #[derive(Default)]
 struct Reader {
-    /// Types by their number, from the first declared one on.
+    /// The declared record types by type number. The first declaration of a number counts.
     declared: Vec<Option<Declared>>,
     keep: Keep,
-    /// The values of a record.
+    /// The values of the present record.
     values: Vec<f64>,
     out: Topics,
     /// The flights before the present one.
     lives: Vec<Topics>,
-    /// Whether a flight beyond the most that are read has begun.
+    /// Whether the file has more flights than are read.
     full: bool,
     /// Number of bytes that belong to no record, and the time that is lost at each such place, s.
     skipped: usize,
@@ -159,7 +159,7 @@ struct Reader {
     last_s: f64,
 }
 
-/// Reads the records that `wanted` names; all others are counted only.
+/// Reads the records that `wanted` names. All others are only counted.
 pub(super) fn read<'a>(
     source: &'a mut dyn Read,
     wanted: &dyn Fn(&str) -> bool,
@@ -188,7 +188,7 @@ pub(super) fn read<'a>(
         let Some(body) = view.get(HEADER..len) else {
             break view.len();
         };
-        // A record that lost or gained a byte ends where no other one begins, and its numbers are invalid.
+        // If a record lost or gained a byte, no other record begins at its end, and its numbers are invalid.
         let next = &view[len..view.len().min(len + DATAFLASH_MAGIC.len())];
         if kind != FMT && !DATAFLASH_MAGIC.starts_with(next) {
             reader.damaged();
@@ -279,7 +279,7 @@ impl Reader {
         self.lives.push(Topics { topics, parameters, firmware, ..Topics::default() });
     }
 
-    /// Takes the numbers of a record of type `kind`, of the instance at `place`.
+    /// Adds the numbers of a record of type `kind` to the instance with index `place`.
     fn sample(&mut self, kind: u8, place: usize, time_s: f64, body: &[u8]) {
         let Some(Some(declared)) = self.declared.get_mut(usize::from(kind)) else { return };
         self.values.clear();
@@ -314,7 +314,7 @@ impl Reader {
         if self.full {
             self.out.findings.push(too_many());
         }
-        // The card's last block is padded, so that a cut record at the end is the rule.
+        // The last block of a card is padded, so a cut record at the end is usual.
         if cut > 0 {
             self.out.findings.push(Finding::warning(format!(
                 "the file ends in the middle of a record, {cut} bytes of which are left out"
@@ -342,7 +342,7 @@ fn parameter(declared: &Declared, body: &[u8]) -> Option<(String, f64)> {
     Some((text(body.get(name.2..name.2 + 16).unwrap_or_default()), value))
 }
 
-/// The firmware's name in a record of a text.
+/// The firmware's name in a MSG record; `None` if its text names no firmware.
 fn firmware(declared: &Declared, body: &[u8]) -> Option<String> {
     let message = declared.fields.iter().find(|f| f.0 == "Message");
     let said = message.map(|f| text(body.get(f.2..).unwrap_or_default()));
@@ -353,7 +353,7 @@ fn firmware(declared: &Declared, body: &[u8]) -> Option<String> {
 mod tests {
     use super::*;
 
-    /// A log of attitudes at these times, µs.
+    /// A log with attitude records at these times, µs.
     fn log(times_us: &[u64]) -> Vec<u8> {
         let padded = |text: &str, width: usize| {
             let mut bytes = text.as_bytes().to_vec();

@@ -1,8 +1,8 @@
-//! The text form of a DataFlash log (`.log`), read through the binary one.
+//! Reads the text form of a DataFlash log (`.log`) by conversion to the binary form.
 //!
-//! Mission Planner and older ground stations save what a card holds as lines `NAME, value, …`, which FMT lines
-//! declare as in the binary file. Each line becomes the record that it was made of. Each line that fits no
-//! declaration becomes one byte, which the reader counts as damage.
+//! Mission Planner and older ground stations save the content of a card as lines `NAME, value, …`. FMT lines declare
+//! the record types, as FMT records do in the binary file. Each line is converted back to its binary record. A line
+//! that fits no declaration becomes one byte, which the reader counts as damage.
 
 use std::collections::HashMap;
 use std::io::{self, BufRead, BufReader, Read};
@@ -12,7 +12,7 @@ use super::format::DATAFLASH_MAGIC;
 
 /// Number of lines allowed before the first declaration: firmware, board, free memory.
 const HEAD: usize = 20;
-/// The longest line that is looked at, bytes.
+/// Length of the longest line that is read as a whole, bytes.
 const LONGEST: u64 = 4096;
 
 /// Whether a file that begins with `start` is a DataFlash log in text.
@@ -23,7 +23,7 @@ pub(super) fn begins(start: &[u8]) -> bool {
     })
 }
 
-/// A text log as the bytes of the binary one.
+/// A reader that converts a text log to the bytes of a binary one.
 pub(super) struct Binary<'a> {
     lines: BufReader<&'a mut dyn Read>,
     /// Type and format letters of each name.
@@ -41,7 +41,7 @@ impl<'a> Binary<'a> {
         Binary { lines, declared, firmware: None, bytes: Vec::new(), from: 0 }
     }
 
-    /// The bytes of the next line; `false` at the end.
+    /// Appends the bytes of the next line to `bytes`; `false` at the end.
     fn next(&mut self) -> io::Result<bool> {
         let mut line = Vec::new();
         if self.lines.by_ref().take(LONGEST).read_until(b'\n', &mut line)? == 0 {
@@ -72,7 +72,8 @@ impl<'a> Binary<'a> {
         Ok(true)
     }
 
-    /// The record of `FMT, type, length, name, letters, label, …`, and the firmware's once there is one for texts.
+    /// The FMT record of the line `FMT, type, length, name, letters, label, …`. After the declaration of MSG, it is
+    /// followed by a MSG record with the firmware's name.
     fn declaration(&mut self, line: &str) -> Option<Vec<u8>> {
         let mut fields = line.splitn(6, ',').map(str::trim).skip(1);
         let (kind, _, name) = (fields.next()?, fields.next()?, fields.next()?);
@@ -118,7 +119,8 @@ impl Read for Binary<'_> {
     }
 }
 
-/// The number of a field with this format `letter`; `None` if it is none, so that its line is damaged.
+/// The number in a field with the format `letter`; `None` if the text is not a number, so that its line counts as
+/// damaged.
 fn number(letter: u8, text: &str) -> Option<f64> {
     match (text.trim().parse::<f64>(), letter) {
         (Ok(x), _) => Some(x),
@@ -130,12 +132,12 @@ fn number(letter: u8, text: &str) -> Option<f64> {
     }
 }
 
-/// The record of a line's values; `None` if there are too few, or if one of them is not what the declaration says.
+/// The record with the values of a line; `None` if there are too few, or if one does not fit the declaration.
 fn record(kind: u8, letters: &str, values: &[&str]) -> Option<Vec<u8>> {
     let mut out = [&DATAFLASH_MAGIC[..], &[kind]].concat();
     let last = letters.len().checked_sub(1)?;
     for (i, letter) in letters.bytes().enumerate() {
-        // A text may hold commas.
+        // A text in the last field may contain commas.
         let rest = if i == last && b"nNZ".contains(&letter) { values.len() } else { i + 1 };
         let text = values.get(i..rest)?.join(",");
         let x = if b"nNZag".contains(&letter) { 0.0 } else { number(letter, &text)? };

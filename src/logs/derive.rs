@@ -1,8 +1,9 @@
-//! Columns that a log lacks, computed from those it has, if a mapping requests it.
+//! Computes columns that a log lacks from others, if a mapping requests it.
 //!
 //! A motion capture measures position and attitude. Velocity is the slope of a parabola through the positions around
-//! a row; body rates are the slopes of the rotations from the row's attitude, fitted alike; the airspeed is the
-//! velocity over ground less a known wind. The mapping states the window. A column is derived only on request.
+//! a row. Body rates are fitted in the same way, as slopes of the rotations relative to the row's attitude. The
+//! airspeed is the magnitude of velocity over ground minus a known wind. The mapping states the time span of the
+//! fits. A column is derived only on request.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -11,7 +12,7 @@ use super::columns::{COLUMNS, index};
 use super::mapping::Mapping;
 use greylag_num::statistics::quantile;
 
-/// Fewest rows that a parabola is laid through.
+/// Smallest number of rows to which a parabola is fitted.
 const FEWEST: usize = 5;
 /// Residual of a parabola, as a multiple of the log's median residual, beyond which the measurement counts as a jump.
 const JUMPED: f64 = 8.0;
@@ -22,7 +23,7 @@ pub(super) const RATES: [&str; 3] = ["p_radps", "q_radps", "r_radps"];
 /// The column of the airspeed.
 pub(super) const AIRSPEED: &str = "airspeed_mps";
 
-/// Fills the columns that `mapping` derives from others; one note for each.
+/// Fills the columns that `mapping` derives from others. Returns notes for the user.
 pub(super) fn apply(rows: &mut [Sample], mapping: &Mapping) -> Vec<String> {
     let mut notes = Vec::new();
     let slopes: Vec<(&str, f64)> = mapping.slopes().collect();
@@ -66,7 +67,8 @@ pub(super) fn apply(rows: &mut [Sample], mapping: &Mapping) -> Vec<String> {
     notes
 }
 
-/// Marks a value that repeats the previous one as missing: a motion capture that has lost its object repeats it.
+/// Replaces a value that repeats the previous one by NaN. A motion capture that has lost its object repeats the last
+/// value.
 fn fresh(samples: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut last = f64::NAN;
     let one = |(t, x): &(f64, f64)| {
@@ -79,7 +81,7 @@ fn fresh(samples: &[(f64, f64)]) -> Vec<(f64, f64)> {
     samples.iter().map(one).collect()
 }
 
-/// Slope and misfit at every sample that has a value, NaN elsewhere.
+/// Slope, and root mean square of the residuals, at every sample that has a value; NaN elsewhere.
 fn slopes_of(samples: &[(f64, f64)], over_s: f64) -> Vec<[f64; 2]> {
     let scale = samples.iter().map(|s| s.1.abs()).filter(|x| x.is_finite()).fold(0.0, f64::max);
     around(
@@ -98,7 +100,7 @@ fn slopes_of(samples: &[(f64, f64)], over_s: f64) -> Vec<[f64; 2]> {
     )
 }
 
-/// Fills p, q, r; returns in how many rows the attitude was lost or jumped.
+/// Fills p, q, r (rad/s). Returns the number of rows in which the attitude was lost or jumped.
 fn body_rates(rows: &mut [Sample], over_s: f64) -> usize {
     let mut last = [f64::NAN; 3];
     let turned: Vec<(f64, Option<UnitQuaternion<f64>>)> = rows
@@ -146,7 +148,7 @@ fn body_rates(rows: &mut [Sample], over_s: f64) -> usize {
     count
 }
 
-/// Value of `fit` for the samples within half of `over_s` around each sample.
+/// Calls `fit` for each sample, with its index and with the samples within half of `over_s` (s) around it.
 fn around<T, R>(
     samples: &[T],
     time: impl Fn(&T) -> f64,
@@ -169,8 +171,8 @@ fn around<T, R>(
     (0..samples.len()).map(one).collect()
 }
 
-/// The slope at 0 of the parabola through `points` (time, value), with the root mean square of the residuals; `None`
-/// with too few of them, or with none on one side.
+/// The slope at time 0 of the parabola fitted to `points` (time, value), and the root mean square of the residuals.
+/// `None` if there are too few points, or none on one side.
 fn parabola(points: &[(f64, f64)], over_s: f64) -> Option<[f64; 2]> {
     let sides = [points.iter().any(|p| p.0 < 0.0), points.iter().any(|p| p.0 > 0.0)];
     if points.len() < FEWEST || sides != [true; 2] {
@@ -188,7 +190,7 @@ fn parabola(points: &[(f64, f64)], over_s: f64) -> Option<[f64; 2]> {
     Some([fit[1] / over_s, (left / points.len() as f64).sqrt()])
 }
 
-/// The slopes without those whose residual exceeds the limit, and the number of those left out.
+/// Replaces slopes whose residual exceeds the limit by NaN. Also returns their number.
 fn settle(fits: Vec<[f64; 2]>) -> (Vec<f64>, usize) {
     let misfits: Vec<f64> = fits.iter().map(|f| f[1]).filter(|x| x.is_finite()).collect();
     let limit = if misfits.is_empty() { f64::INFINITY } else { JUMPED * quantile(&misfits, 0.5) };
@@ -214,8 +216,8 @@ mod tests {
         [derive]\nbody_rates_over_s = 0.07\n[sensors]\nwind_north_mps = { value = 2.0, sd = 0.1 }\n\
         wind_east_mps = { value = 0.0, sd = 0.1 }\n";
 
-    /// A coordinated turn: pitch 0.1, bank 0.5, ψ̇ = 0.6 rad/s, 8 m/s over ground on its heading;
-    /// the velocity columns hold positions, as a mapping puts them there.
+    /// A coordinated turn: pitch 0.1 rad, bank 0.5 rad, ψ̇ = 0.6 rad/s, 8 m/s over ground along its heading. The
+    /// velocity columns hold positions, which the mapping differentiates.
     fn turn(k: usize) -> Sample {
         let (t, turn, v) = (0.01 * k as f64, 0.6, 8.0);
         let yaw: f64 = turn * t;

@@ -1,4 +1,4 @@
-//! Opening of a log file: compression, text encoding, and the part that is requested.
+//! Opens a log file: unpacks it, recognises UTF-16, and separates the number of a flight from the path.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -45,7 +45,8 @@ fn begun(mut source: Box<dyn Read>) -> io::Result<(Vec<u8>, Box<dyn Read>)> {
     Ok((start, source))
 }
 
-/// The file and the number of the flight in it that `path` names: `FILE#2`, where no file has that name.
+/// Splits the path `FILE#2` into the file and the number of the flight in it. The number is `None` if the path has
+/// none, or if a file with the whole name exists.
 pub(super) fn part(path: &Path) -> (PathBuf, Option<usize>) {
     let text = path.to_string_lossy();
     let named = text.rsplit_once('#').and_then(|(file, number)| {
@@ -62,7 +63,8 @@ enum Wide {
     Big,
 }
 
-/// Byte order of a text in UTF-16, from its byte order mark or from the zero bytes between its letters.
+/// Byte order of UTF-16 text that begins with `start`. It follows from the byte order mark, or from the zero bytes
+/// between ASCII letters. `None` if the text is not UTF-16.
 fn wide(start: &[u8]) -> Option<Wide> {
     match start {
         [0xFF, 0xFE, ..] => return Some(Wide::Little),
@@ -76,12 +78,12 @@ fn wide(start: &[u8]) -> Option<Wide> {
     if letters(1) { Some(Wide::Little) } else { letters(0).then_some(Wide::Big) }
 }
 
-/// Whether a text that begins so is in UTF-16.
+/// Whether a text that begins with `start` is in UTF-16.
 pub(super) fn is_wide(start: &[u8]) -> bool {
     wide(start).is_some()
 }
 
-/// Text in UTF-8 from text in UTF-16; `None` of what is not UTF-16.
+/// Converts text from UTF-16 to UTF-8; `None` if `bytes` are not UTF-16.
 pub(super) fn narrowed(bytes: &[u8]) -> Option<Vec<u8>> {
     let wide = wide(bytes)?;
     let unit = |pair: &[u8]| match wide {

@@ -21,22 +21,22 @@ pub enum LogError {
         /// Path of the log.
         path: PathBuf,
     },
-    /// The file is none of the formats.
+    /// The file has none of the supported formats.
     #[error("{} is no flight log: {what}", path.display())]
     Foreign {
         /// Path of the file.
         path: PathBuf,
-        /// Format of the file, and the file to give instead.
+        /// What the file is, if that is known, and which file to give instead.
         what: &'static str,
     },
-    /// The file has no flight of that number.
+    /// The path names a flight by its number (`FILE#2`), but the file has fewer flights.
     #[error("flight log {} holds {there} flights: there is no #{asked} in it", path.display())]
     Part {
         /// Path of the log.
         path: PathBuf,
         /// The requested number.
         asked: usize,
-        /// How many there are.
+        /// Number of flights in the file.
         there: usize,
     },
     /// The vehicle has no wings.
@@ -47,12 +47,12 @@ pub enum LogError {
         /// Type of the vehicle, and the remedy.
         why: String,
     },
-    /// The CSV is wrong.
+    /// The CSV file cannot be used.
     #[error("{error}{hint}")]
     Csv {
         /// Error of the CSV reader.
         error: CsvError,
-        /// Probable wrong units, for the message; may be empty.
+        /// Text on columns whose units are probably wrong; may be empty.
         hint: String,
     },
     /// The file has no data for a required column.
@@ -65,20 +65,20 @@ pub enum LogError {
         /// Fields from which the column can be read.
         remedy: String,
     },
-    /// Too many rows cannot be used.
+    /// More than 5 % of the rows are unusable.
     #[error("flight log {}: {dropped} of {rows} rows are unusable ({reasons}; first: row {first}), above 5 %: repair it or read it leniently{hint}", path.display())]
     Unusable {
         /// Path of the log.
         path: PathBuf,
         /// Number of rows that were dropped.
         dropped: usize,
-        /// Rows of the table.
+        /// Number of rows in the table.
         rows: usize,
         /// Reasons for dropping, with counts.
         reasons: String,
-        /// The first of those dropped.
+        /// Number of the first dropped row.
         first: usize,
-        /// Probable wrong units, for the message; may be empty.
+        /// Text on columns whose units are probably wrong; may be empty.
         hint: String,
     },
 }

@@ -10,13 +10,13 @@ use super::mapping::TEXT;
 pub enum Severity {
     /// For information; the log can be used fully.
     Note,
-    /// Some of the log cannot be used, or not fully.
+    /// Part of the log cannot be used.
     Warning,
     /// Results computed from the log would be wrong.
     Problem,
 }
 
-/// The mapping that corrects a column.
+/// A factor that corrects a column. Its `Display` text is the entry for a mapping file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cure {
     /// Name of the column to be corrected.
@@ -38,11 +38,11 @@ impl std::fmt::Display for Cure {
 /// A defect or peculiarity of a log, for its user.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
-    /// How much it matters.
+    /// How much the finding matters.
     pub severity: Severity,
     /// Description of the finding, with a remedy.
     pub text: String,
-    /// The column and factor that correct it, if a factor does.
+    /// The column and the factor that correct the defect; `None` if no factor can.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cure: Option<Cure>,
 }

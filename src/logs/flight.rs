@@ -13,7 +13,7 @@ pub struct Sample {
     pub attitude_rad: [f64; 3],
     /// p, q, r: body rates, rad/s.
     pub rates_radps: [f64; 3],
-    /// True airspeed relative to the air, m/s.
+    /// True airspeed, m/s.
     pub airspeed_mps: f64,
     /// Angle of attack, rad; positive with the air from below.
     pub alpha_rad: f64,
@@ -47,8 +47,8 @@ pub struct Sample {
     pub roll_target_rad: f64,
     /// Commanded pitch θ*, rad (an extra column, `pitch_target_rad`).
     pub pitch_target_rad: f64,
-    /// Time for which the body rates hold from this sample, s; 0 for samples at instants (an extra
-    /// column, `rate_hold_s`).
+    /// Time for which the body rates are held from this sample, s; 0 for samples at instants (an extra column,
+    /// `rate_hold_s`).
     pub rate_hold_s: f64,
 }
 
@@ -88,7 +88,7 @@ impl Default for Sample {
 pub enum Sampling {
     /// The rate at the instant of the sample, as gyros and most simulators log it.
     Instants,
-    /// The rate that a simulator holds from this sample to the next one. JSBSim advances so: rates and
+    /// The rate that a simulator holds from this sample to the next one. JSBSim integrates in this way: rates and
     /// attitude by explicit Euler, velocity by Adams–Bashforth 2.
     Held,
 }
@@ -99,7 +99,7 @@ pub enum FlowAngles {
     /// Vanes or another sensor of the flow.
     #[default]
     Measured,
-    /// A flight controller's estimate from velocity, attitude and wind: it repeats the other sensors.
+    /// A flight controller's estimate from velocity, attitude and wind. It adds no information to those sensors.
     Estimated,
 }
 
@@ -133,7 +133,7 @@ impl Flight {
 
     /// How the rates were sampled, from the log's own column `rate_hold_s`; `None` without the column.
     ///
-    /// A simulator that holds its rates for less than half a sample period samples at instants.
+    /// A simulator that holds its rates for less than half a sample period counts as sampling at instants.
     pub fn declared_sampling(&self) -> Option<Sampling> {
         let held: Vec<f64> =
             self.samples.iter().map(|s| s.rate_hold_s).filter(|x| x.is_finite()).collect();

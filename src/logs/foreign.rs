@@ -38,11 +38,11 @@ const KNOWN: [(&[u8], &str); 11] = [
     (b"%PDF", "it is a PDF document"),
 ];
 
-/// Message on a ROS 2 bag of a program that is built without the reader of bags.
+/// Message about a ROS 2 bag if the program was built without the reader of bags.
 #[cfg(not(feature = "ros"))]
 pub(super) const BAG_WITHOUT_READER: &str = "it is a ROS 2 bag (MCAP), which this program was built without a reader for: build it with --features study, as `cargo greylag` and the installed program are";
 
-/// Number of zero bytes with which no log begins.
+/// A file that begins with this number of zero bytes is not a log.
 const EMPTY: usize = 256;
 
 /// Kind of the file that begins with `start`, in words; `None` if it is unknown.
@@ -57,13 +57,14 @@ pub(super) fn kind(start: &[u8]) -> Option<&'static str> {
     ))
 }
 
-/// PX4's format before ULog: records like those of a DataFlash log, with another meaning.
+/// Message about sdlog2, PX4's format before ULog. Its records look like those of a DataFlash log but have another
+/// meaning.
 pub(super) const SDLOG2: &str = "it is a log of PX4 from before ULog (sdlog2, .px4log), whose records have no times of their own: sdlog2_dump.py of that PX4 makes a CSV of it";
 
-/// Frames in a row that show a stream.
+/// Number of successive frames that show a stream.
 const IN_A_ROW: usize = 3;
 
-/// Whether frames of MAVLink follow one another, perhaps after the end of a cut one.
+/// Whether MAVLink frames follow one another in `start`, perhaps after the rest of a cut frame.
 fn frames_without_times(start: &[u8]) -> bool {
     let follow = |from: usize| {
         let mut at = from;
@@ -76,7 +77,7 @@ fn frames_without_times(start: &[u8]) -> bool {
     (0..start.len().min(300)).any(follow)
 }
 
-/// Length of the frame at the beginning of `bytes`, by its header.
+/// Length of the frame at the beginning of `bytes`, from its header; `None` if no frame begins there.
 fn frame(bytes: &[u8]) -> Option<usize> {
     let [marker, payload, flags, ..] = bytes else { return None };
     let signature = if flags & 1 == 1 { 13 } else { 0 };

@@ -26,7 +26,7 @@ pub(super) const ULOG_MAGIC: [u8; 7] = [0x55, 0x4C, 0x6F, 0x67, 0x01, 0x12, 0x35
 pub(super) const MCAP_MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 /// First bytes of every DataFlash record.
 pub(super) const DATAFLASH_MAGIC: [u8; 2] = [0xA3, 0x95];
-/// Start markers of MAVLink 1 and 2, behind the eight bytes of the time.
+/// Start markers of MAVLink 1 and 2. In a `.tlog`, eight bytes with the time precede each of them.
 pub(super) const MAVLINK_MARKERS: [u8; 2] = [0xFE, 0xFD];
 
 impl Format {
@@ -41,7 +41,7 @@ impl Format {
         if bytes.starts_with(&DATAFLASH_MAGIC) {
             return Some(Format::Dataflash);
         }
-        // A time before the year 2100 in microseconds has a zero first byte, which no text has.
+        // A `.tlog` begins with a big-endian time in µs, whose first byte is zero. No text begins with a zero byte.
         if bytes.first() == Some(&0) && bytes.get(8).is_some_and(|b| MAVLINK_MARKERS.contains(b)) {
             return Some(Format::Tlog);
         }
@@ -59,7 +59,7 @@ impl Format {
         (text && separated).then_some(Format::Csv)
     }
 
-    /// The format's name for people.
+    /// The name of the format as shown to the user.
     pub fn name(self) -> &'static str {
         match self {
             Format::Csv => "CSV table",

@@ -1,4 +1,4 @@
-//! A CSV log that another program is still writing: rows as they come.
+//! Reads a CSV log while another program is still writing it.
 
 use std::path::Path;
 

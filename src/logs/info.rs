@@ -20,35 +20,35 @@ pub struct Info {
     pub name: String,
     /// Format of the file.
     pub format: Format,
-    /// Rows of the table.
+    /// Number of rows in the table.
     pub rows: usize,
-    /// Rows that were dropped.
+    /// Number of rows that were dropped.
     pub dropped_rows: usize,
     /// Time of the first row, s.
     pub from_s: f64,
     /// Time of the last row, s.
     pub to_s: f64,
-    /// Rows a second, by the median period.
+    /// Rate of the rows from their median period, Hz.
     pub rate_hz: f64,
-    /// Gaps that split the log: their starts with their lengths, s.
+    /// Gaps that split the log: start and length, s.
     pub gaps: Vec<(f64, f64)>,
     /// Time in flight, s.
     pub flight_s: f64,
-    /// Phases of flight and ground, in order.
+    /// Phases of flight and ground, in order of time.
     pub phases: Vec<Phase>,
     /// The vehicle, where the log names it.
     pub vehicle: Option<Vehicle>,
-    /// Times outside wing-borne flight (from, to), s; their rows are left out.
+    /// Intervals outside wing-borne flight (from, to), s. Their rows are left out.
     pub hovers: Vec<(f64, f64)>,
-    /// Vehicle and boot of this flight, where the file holds several.
+    /// Vehicle and boot of this flight, in words; `None` unless the file holds several.
     pub life: Option<String>,
-    /// Instances of the topics that have several.
+    /// All instances of each topic that has more than one.
     pub sources: Vec<Source>,
     /// Channels that fill the table.
     pub channels: Vec<Channel>,
     /// Purposes with the channels that the log lacks for each.
     pub purposes: Vec<Purpose>,
-    /// Topics of the file: name, instance, records.
+    /// Topics of the file: name, instance, number of records.
     pub topics: Vec<(String, u16, usize)>,
     /// Findings for the log's user.
     pub findings: Vec<Finding>,
@@ -59,7 +59,7 @@ pub struct Info {
 pub struct Purpose {
     /// Name of the purpose.
     pub name: &'static str,
-    /// Columns that the log lacks for it; empty if the log suffices.
+    /// Columns that the log lacks for the purpose; empty if the log suffices.
     pub missing: Vec<String>,
     /// Columns that are present at too low a rate.
     pub slow: Vec<String>,
@@ -118,13 +118,13 @@ impl Info {
         }
     }
 
-    /// The worst of the findings.
+    /// The highest severity among the findings.
     pub fn severity(&self) -> Severity {
         self.findings.iter().map(|f| f.severity).max().unwrap_or(Severity::Note)
     }
 }
 
-/// Finding about a rudder that moves.
+/// Finding about a rudder that moves; `None` if it does not.
 fn rudder(log: &Log) -> Option<Finding> {
     let motion = RudderMotion::of(&log.flight.samples)?;
     Some(Finding::warning(format!(
@@ -133,7 +133,7 @@ fn rudder(log: &Log) -> Option<Finding> {
     )))
 }
 
-/// Fraction of the rows, or of the samples expected at its own rate, from which a column counts as present.
+/// A column counts as present if it fills this fraction of the rows, or of the samples expected at its own rate.
 const PRESENT: f64 = 0.5;
 
 /// Number of rows with a value, for each column.
@@ -160,7 +160,7 @@ fn has(log: &Log, filled: &[usize; COLUMNS.len()], column: &str) -> bool {
     count > 0 && (count as f64 >= PRESENT * samples.len() as f64 || covered)
 }
 
-/// The actuators without data, and those whose position follows from the command by the actuator model.
+/// Lists the actuators without data, then those whose position is computed from the command by the actuator model.
 fn actuators(has: impl Fn(&str) -> bool) -> (Vec<String>, Vec<String>) {
     let mut missing = Vec::new();
     let mut instead = Vec::new();
@@ -174,7 +174,7 @@ fn actuators(has: impl Fn(&str) -> bool) -> (Vec<String>, Vec<String>) {
     (missing, instead)
 }
 
-/// The purpose with its obstacles besides absent columns: no wings, no flight, slow channels.
+/// Adds obstacles other than absent columns to `purpose`: no wings, no flight, slow channels.
 fn weighed(log: &Log, flight_s: f64, mut purpose: Purpose) -> Purpose {
     let wings = log.vehicle.as_ref().is_none_or(|v| v.refusal().is_none());
     if !wings {
@@ -200,7 +200,7 @@ fn weighed(log: &Log, flight_s: f64, mut purpose: Purpose) -> Purpose {
     purpose
 }
 
-/// Sources of air density that replace a logged one.
+/// Source of the air density that replaces a logged one; empty if the log has its own.
 fn density(has: impl Fn(&str) -> bool) -> Vec<String> {
     match (has("air_density_kgpm3"), has("altitude_m")) {
         (true, _) => Vec::new(),
@@ -211,7 +211,7 @@ fn density(has: impl Fn(&str) -> bool) -> Vec<String> {
     }
 }
 
-/// The purpose for which slow channels suffice.
+/// Name of the purpose for which slow channels suffice.
 const INCIDENCE: &str = "alpha, beta";
 
 fn purposes(log: &Log) -> Vec<Purpose> {

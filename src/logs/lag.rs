@@ -1,8 +1,8 @@
-//! Delay of a channel against the inertial ones, by cross-correlation.
+//! Delay of velocity and airspeed relative to the inertial sensors, by cross-correlation.
 //!
-//! The rate of change of the ground velocity equals the specific force in earth axes plus gravity;
-//! that of the airspeed equals the specific force along the body axis. The delay is the shift with
-//! the highest correlation.
+//! The rate of change of the ground velocity equals the specific force in earth axes plus gravity. The rate of change
+//! of the airspeed is about the acceleration along the body x axis. The delay is the shift with the highest
+//! correlation.
 
 use nalgebra::{Rotation3, Vector3};
 
@@ -11,7 +11,7 @@ use super::finding::Finding;
 use greylag_num::statistics::mean;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 
-/// Step of the shifts and of the series that are shifted, s.
+/// Sample period of the compared series, and step of the shifts, s.
 const STEP_S: f64 = 0.05;
 /// Largest shift that is tried, s.
 const SHIFT_S: f64 = 3.0;
@@ -59,7 +59,7 @@ fn said(what: &str, key: &str, delay_s: f64) -> Option<Finding> {
     }
 }
 
-/// The rows of the longest stretch of a log at even times.
+/// The longest stretch of a log without gaps, and evenly spaced times for its resampling.
 struct Grid<'a> {
     rows: Vec<&'a Sample>,
     times: Vec<f64>,
@@ -93,12 +93,12 @@ impl<'a> Grid<'a> {
         (length >= SHORTEST_S).then(|| Grid { rows: rows[best].to_vec(), times })
     }
 
-    /// A column at the even times; `None` where it is too slow or absent.
+    /// A column resampled to the even times; `None` if it is too slow or absent.
     fn series(&self, get: impl Fn(&Sample) -> f64) -> Option<Vec<f64>> {
         self.at_even_times(self.rows.iter().copied().map(get))
     }
 
-    /// The `values` of the rows at the even times; `None` where they are too slow or absent.
+    /// The `values` of the rows resampled to the even times; `None` if they are too slow or absent.
     fn at_even_times(&self, values: impl Iterator<Item = f64>) -> Option<Vec<f64>> {
         let pairs = self.rows.iter().map(|s| s.time_s).zip(values);
         let own: Vec<(f64, f64)> = pairs.filter(|(_, x)| x.is_finite()).collect();
@@ -122,7 +122,7 @@ impl<'a> Grid<'a> {
         n.iter().zip(&e).zip(&d).map(|((n, e), d)| Vector3::new(*n, *e, *d)).collect()
     }
 
-    /// Acceleration along the body axis at the even times, m/s².
+    /// Acceleration along the body x axis at the even times, m/s².
     fn along(&self) -> Vec<f64> {
         let along =
             |s: &Sample| s.specific_force_mps2[0] - STANDARD_GRAVITY * s.attitude_rad[1].sin();
@@ -130,15 +130,15 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// Specific force and gravity in earth axes.
+/// Acceleration in earth axes (NED), m/s²: specific force plus gravity.
 fn earth(s: &Sample) -> Vector3<f64> {
     let [roll, pitch, yaw] = s.attitude_rad;
     Rotation3::from_euler_angles(roll, pitch, yaw) * Vector3::from(s.specific_force_mps2)
         + Vector3::new(0.0, 0.0, STANDARD_GRAVITY)
 }
 
-/// Shift at which the change of each first series matches its second series best; `None` where no
-/// shift is significant.
+/// The delay of the first series of each pair, s: the shift at which its change matches the second series best.
+/// `None` if no shift is significant.
 fn delay(pairs: &[(Vec<f64>, Vec<f64>)]) -> Option<f64> {
     let over = (OVER_S / STEP_S) as usize;
     let (mut changes, mut expected): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
@@ -172,7 +172,7 @@ fn centred(values: Vec<f64>) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Level flight north whose speed swings with several periods; velocity `late` s behind.
+    /// Level flight north with an oscillating speed. The velocity over ground is `late` s late.
     fn rows(late: f64) -> Vec<Sample> {
         let speed = |t: f64| 15.0 + (0.9 * t).sin() + 0.7 * (2.3 * t + 1.0).sin();
         let force = |t: f64| 0.9 * (0.9 * t).cos() + 0.7 * 2.3 * (2.3 * t + 1.0).cos();

@@ -1,6 +1,7 @@
-//! A flight in memory, with the formats it is read from or written to.
+//! Flight logs: readers and writers of the file formats, and a flight in memory.
 //!
-//! [`load`] reads any of the five formats, distinguished by their first bytes, onto one table.
+//! [`load`] recognises one of the five formats by the first bytes of the file and resamples the channels onto one
+//! table.
 
 mod assess;
 mod binary;

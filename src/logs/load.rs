@@ -1,4 +1,4 @@
-//! Reads a log file of any format onto one table.
+//! Reads a log file of any format into one table.
 
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -26,11 +26,11 @@ use super::{Flight, binary, dataflash, text, tlog, ulog};
 pub struct Options {
     /// How many unusable rows a log may have.
     pub tolerance: Tolerance,
-    /// Sources of columns that differ from the format's usual ones.
+    /// The user's mapping. Its sources of columns replace those built in for the format.
     pub mapping: Mapping,
-    /// Criteria for flight.
+    /// Criteria by which rows count as flight.
     pub flies: Flying,
-    /// Instances to read instead of those that the reader would choose.
+    /// Topic instances that the user chose in place of the reader's choice.
     pub sources: Vec<Asked>,
 }
 
@@ -43,7 +43,7 @@ pub struct Channel {
     pub origin: String,
     /// Number of usable samples.
     pub samples: usize,
-    /// Samples a second, by the median period.
+    /// Sample rate from the median sample period, Hz.
     pub rate_hz: f64,
     /// Longest time between two samples, s.
     pub largest_gap_s: f64,
@@ -62,9 +62,10 @@ pub struct Log {
     pub channels: Vec<Channel>,
     /// Topics of the file (name, instance, records), used or not.
     pub topics: Vec<(String, u16, usize)>,
-    /// Rows of the table dropped as out of order, repeated, incomplete or impossible.
+    /// Number of rows dropped because they are out of order, repeated, incomplete or impossible.
     pub dropped: usize,
-    /// Numbers of the first dropped rows. In a CSV the header is row 1, in other formats the first row is.
+    /// Numbers of the first dropped rows. In a CSV the header is row 1; in other formats the first row of data is row
+    /// 1.
     pub dropped_rows: Vec<usize>,
     /// Findings for the log's user.
     pub findings: Vec<Finding>,
@@ -72,25 +73,25 @@ pub struct Log {
     pub flies: Flying,
     /// The vehicle, where the log names it.
     pub vehicle: Option<Vehicle>,
-    /// Times outside wing-borne flight (from, to), s; their rows are left out.
+    /// Intervals outside wing-borne flight (from, to), s. Their rows are left out.
     pub hovers: Vec<(f64, f64)>,
-    /// Instances of the topics that have several.
+    /// All instances of each topic that has more than one.
     pub sources: Vec<Source>,
-    /// Vehicle and boot of this flight, where the file holds several.
+    /// Vehicle and boot of this flight, in words; `None` unless the file holds several.
     pub life: Option<String>,
-    /// Statistics of the whole log, if the inspection of a long log kept only stretches of it.
+    /// Statistics of the whole log, if only stretches of its rows are kept (inspection of a long log).
     pub stretches: Option<Stretches>,
 }
 
 impl Log {
-    /// Defects that falsify figures computed from the log, one a line; `None` if there are none.
+    /// Texts of the findings of severity [`Severity::Problem`], joined by semicolons; `None` if there are none.
     pub fn problems(&self) -> Option<String> {
         let problems = self.findings.iter().filter(|f| f.severity == Severity::Problem);
         let lines: Vec<&str> = problems.map(|f| f.text.as_str()).collect();
         (!lines.is_empty()).then(|| lines.join("; "))
     }
 
-    /// Phases of flight and ground, in order.
+    /// Phases of flight and ground, in order of time.
     pub fn phases(&self) -> Vec<Phase> {
         match &self.stretches {
             Some(stretches) => stretches.phases.clone(),
@@ -113,8 +114,8 @@ pub(super) enum Use {
     Look,
 }
 
-/// Reads as much of a log as possible, for inspection: missing columns with unusable rows are findings, not errors.
-/// Of several flights in it the longest is taken.
+/// Reads as much of a log as possible, for inspection. Missing columns and unusable rows become findings, not errors.
+/// If the file holds several flights, the longest is returned.
 ///
 /// # Errors
 /// The file cannot be read, or is not a log.
@@ -130,7 +131,8 @@ pub fn inspect_all(path: &Path, options: &Options) -> Result<Vec<Log>, LogError>
     open(path, options, Use::Look)?.into_iter().collect()
 }
 
-/// Reads a log, whatever its format. Of several flights in it the longest is taken; `FILE#2` names another.
+/// Reads a log, whatever its format. If the file holds several flights, the longest is returned; the path `FILE#2`
+/// selects the second one.
 ///
 /// # Errors
 /// The file cannot be read, is not a log, lacks a required column, or has too many unusable rows.
@@ -138,8 +140,8 @@ pub fn load(path: &Path, options: &Options) -> Result<Log, LogError> {
     longest(open(path, options, Use::Compute)?)
 }
 
-/// Reads all flights of a log, one for each boot of each vehicle in it. If some fly and others do
-/// not, those that do not are dropped, and the findings of the first flight list them.
+/// Reads all flights of a log, one for each boot of each vehicle in it. Boots without time in flight are left out if
+/// another boot has some; a finding of the first flight lists them.
 ///
 /// # Errors
 /// As [`load`], if none of them can be read.
@@ -170,7 +172,7 @@ pub fn parse(bytes: &[u8], path: &Path, options: &Options) -> Result<Log, LogErr
     longest(read(start, &mut &bytes[..], path, options, Use::Compute)?)
 }
 
-/// Name, boot and flight time of a flight, in words.
+/// Name, boot and flight time of a log in words, or its error.
 fn said_of(log: &Result<Log, LogError>) -> String {
     match log {
         Ok(log) => {
@@ -181,7 +183,8 @@ fn said_of(log: &Result<Log, LogError>) -> String {
     }
 }
 
-/// The log with the longest flight, with the others in its findings; else the first error.
+/// Returns the log with the longest time in flight, with a finding that lists the others. If no log can be read,
+/// returns the first error.
 fn longest(mut all: Vec<Result<Log, LogError>>) -> Result<Log, LogError> {
     if all.len() == 1 {
         return all.swap_remove(0);
@@ -219,13 +222,13 @@ fn open(path: &Path, options: &Options, to: Use) -> Result<Lives, LogError> {
     Ok(vec![all.swap_remove(number - 1)])
 }
 
-/// Bytes of a table that are read at a time.
+/// Size of the read buffer for tables, bytes.
 const BUFFER: usize = 64 * 1024;
 
 /// Message for a file of unknown format.
 const NONE_OF_THEM: &str = "it begins neither like a CSV table nor a PX4 ULog, an ArduPilot DataFlash .bin or .log, a MAVLink .tlog, or a ROS 2 bag (.mcap)";
 
-/// Reads the flights of the log `source`, which begins with `start`.
+/// Reads the flights of the log `source`, whose first bytes are `start`.
 fn read(
     start: &[u8],
     source: &mut dyn Read,
@@ -259,7 +262,7 @@ fn read(
     Ok(lives.into_iter().enumerate().map(one).collect())
 }
 
-/// Decodes the topics of each flight of a log that is no table.
+/// Decodes the topics of each flight of a log that is not a CSV table.
 fn decoded(
     format: Format,
     start: &[u8],
@@ -308,7 +311,7 @@ fn decoded(
     Ok(lives)
 }
 
-/// Reads the flights of a table.
+/// Reads the flights of a CSV table.
 fn table(
     start: &[u8],
     source: &mut dyn Read,
@@ -325,25 +328,25 @@ fn table(
     text::read(&mut &bytes[..], path, options, to, keep)
 }
 
-/// The text of `source`, which is in UTF-16, in UTF-8.
+/// Reads the UTF-16 text `source` and returns it in UTF-8.
 fn decode(source: &mut dyn Read) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     source.read_to_end(&mut bytes)?;
     Ok(door::narrowed(&bytes).unwrap_or(bytes))
 }
 
-/// The name of a file.
+/// The name of the file without its folders.
 pub(super) fn name(path: &Path) -> String {
     path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// Probable wrong units behind unusable rows, for an error text: the findings of `screening` whose
-/// text contains "look" ("looks like degrees"), so such a text must keep that word.
+/// Text on units that are probably wrong, for the error about unusable rows. It consists of the findings of
+/// `screening` whose text contains "look" ("looks like degrees"). Such a text must therefore keep that word.
 pub(super) fn hint(findings: &[Finding]) -> String {
     findings.iter().filter(|f| f.text.contains("look")).map(|f| format!("; {}", f.text)).collect()
 }
 
-/// Finding about dropped rows, if any.
+/// Finding about `count` dropped rows, of which `numbers` are the first; `None` if no row was dropped.
 pub(super) fn dropped(count: usize, numbers: &[usize]) -> Option<Finding> {
     let list = numbers.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
     let more = if count > numbers.len() { " …" } else { "" };

@@ -10,18 +10,19 @@ pub(super) struct Share {
     pub field: usize,
     /// Name of the log-format column.
     pub column: &'static str,
-    /// Place of that column in a sample.
+    /// Access to that column in a sample.
     pub place: Place,
     /// Factor on the file column.
     pub share: f64,
 }
 
-/// Deflections of the controls, then their commands.
+/// Columns of the deflections, then of the commands, in the order of the mixer's controls.
 const DEFLECTIONS: [&str; 4] = ["aileron_rad", "elevator_rad", "rudder_rad", "throttle"];
 const COMMANDS: [&str; 4] = ["aileron_cmd", "elevator_cmd", "rudder_cmd", "throttle_cmd"];
 
-/// Log-format columns computable from `names` with the mixer of `mapping`: NAME_rad and NAME_throttle give deflections and
-/// throttle; NAME_cmd gives commands. Columns that the file or the mapping already has are left out.
+/// Finds the log-format columns that can be computed from the file's columns `names` with the mixer of `mapping`. For
+/// a surface or motor NAME, NAME_rad and NAME_throttle give deflections and throttle, and NAME_cmd gives commands.
+/// Columns that the file or the mapping already has are left out.
 pub(super) fn columns(names: &[String], mapping: &Mapping) -> Vec<Share> {
     let Some(mixer) = mapping.mixer() else { return Vec::new() };
     let deflections: Vec<[f64; 4]> = mixer.shares().collect();
@@ -39,7 +40,8 @@ pub(super) fn columns(names: &[String], mapping: &Mapping) -> Vec<Share> {
     both.into_iter().flatten().collect()
 }
 
-/// The shares of control `j`; `None` if a column is missing.
+/// The contributions to control `j` of the mixer; `None` if the file lacks a column for one of its surfaces or
+/// motors.
 fn made_of(
     names: &[String],
     mixer: &Mixer,

@@ -1,4 +1,4 @@
-//! Names of flights where several logs are used.
+//! Names that distinguish the flights of several logs.
 
 use std::path::Path;
 

@@ -16,7 +16,7 @@ pub(crate) enum Number {
 }
 
 impl Number {
-    /// The type by its name in a ULog or in a ROS definition; `None` if the type is not a number.
+    /// The type with this name in a ULog or a ROS definition; `None` if the type is not a number.
     pub(crate) fn named(name: &str) -> Option<Number> {
         Some(match name {
             "int8_t" | "int8" => Number::I8,

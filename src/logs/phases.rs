@@ -1,4 +1,4 @@
-//! Phases of a log: on the ground, in flight, split at gaps.
+//! Splits a log into phases on the ground and in flight, and at gaps.
 
 use serde::Serialize;
 
@@ -11,9 +11,10 @@ pub struct Flying {
     pub from_mps: f64,
     /// Time for which the airspeed must stay above `from_mps`, s.
     pub sustained_s: f64,
-    /// Shortest flight that supports a verdict, s.
+    /// Shortest flight time with which a log can be studied, s.
     pub shortest_s: f64,
-    /// Time without rows that does not count as a gap, s: that between the kept stretches of a long log.
+    /// Time without rows up to which a phase is not split, s. It covers the time between the kept stretches of a long
+    /// log and is otherwise 0.
     pub bridged_s: f64,
 }
 
@@ -27,8 +28,8 @@ impl Default for Flying {
 impl Flying {
     /// Criteria for an aircraft that flies above `airspeed`, m/s.
     ///
-    /// The time constants of its motions scale with V/g (Froude scaling), so that a slower aircraft needs less time. The
-    /// times of a faster one are not longer than the default ones.
+    /// The time constants of the motion scale with V/g (Froude scaling), so a slower aircraft needs less time than
+    /// the default. A faster aircraft has the default times.
     pub fn from(airspeed: f64) -> Flying {
         let usual = Flying::default();
         let share = (airspeed / usual.from_mps).min(1.0);
@@ -41,7 +42,7 @@ impl Flying {
     }
 }
 
-/// Shortest gap that splits a log, s; three sample periods if those are longer.
+/// A time between rows above this, s, splits a log. If three sample periods are longer, they apply instead.
 const GAP_S: f64 = 0.1;
 
 /// Kind of a phase.
@@ -63,7 +64,7 @@ pub struct Phase {
     pub from_s: f64,
     /// Time of the last row, s.
     pub to_s: f64,
-    /// Number of rows in it.
+    /// Number of rows in the phase.
     pub rows: usize,
 }
 
@@ -73,7 +74,7 @@ pub fn split_s(rows: &[Sample]) -> f64 {
     GAP_S.max(3.0 * super::topics::period_s(&times))
 }
 
-/// The phases of a log in order.
+/// The phases of a log in order of time.
 pub fn phases(rows: &[Sample], flies: &Flying) -> Vec<Phase> {
     let split = split_s(rows).max(flies.bridged_s);
     let flying = |airspeed: f64| {
@@ -97,7 +98,7 @@ pub fn phases(rows: &[Sample], flies: &Flying) -> Vec<Phase> {
             _ => raw.push(Phase { kind, from_s: row.time_s, to_s: row.time_s, rows: 1 }),
         }
     }
-    // A phase that is too short is merged with the one before it.
+    // A phase shorter than `sustained_s` is merged with the preceding one.
     let mut out: Vec<Phase> = Vec::new();
     for mut phase in raw {
         let short = phase.to_s - phase.from_s < flies.sustained_s;

@@ -1,8 +1,8 @@
 //! Quality of a channel's samples: rate of new values, interpolated values, frozen values.
 //!
-//! A table that was resampled to one clock shows a sample in every row. Between the samples of a slow sensor a
-//! straight line was drawn, or the last value was held: the second differences are zero, or all differences are. Such
-//! rows are not measurements.
+//! A table that was resampled to one clock has a value in every row. Between the samples of a slow sensor, values
+//! were interpolated on a straight line or held. Interpolated values have zero second differences, held values have
+//! zero first differences. Such rows are not measurements.
 
 use serde::Serialize;
 
@@ -12,34 +12,36 @@ use greylag_num::statistics::quantile;
 /// Quality of the samples of a channel.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Quality {
-    /// Rate of new values, Hz; 0 where too little changes for an estimate.
+    /// Rate of new values, Hz; 0 if too little changes for an estimate.
     pub native_hz: f64,
-    /// Whether most samples lie on straight lines between others.
+    /// Whether most samples lie on straight lines between other samples.
     pub interpolated: bool,
-    /// Smallest decimal step of the values; 0 where they have none.
+    /// Decimal step to which the values are rounded, in the column's unit; 0 if there is none.
     pub quantum: f64,
     /// Intervals in which one value stays for much longer than usual: from, to, s.
     pub frozen: Vec<(f64, f64)>,
-    /// Short excursions far beyond the neighbours.
+    /// Number of spikes: short excursions far beyond the neighbouring samples.
     pub spikes: usize,
-    /// The largest of them.
+    /// Value of the largest spike, in the column's unit; 0 without spikes.
     pub largest_spike: f64,
 }
 
 /// Smallest number of samples for an assessment.
 const ENOUGH: usize = 100;
-/// Share of the moving samples on straight lines from which they count as interpolated.
+/// Values count as interpolated if more than this share of the changing ones lies on straight lines.
 const STRAIGHT: f64 = 0.7;
-/// A kink counts if it is this many times the rounding step.
+/// Smallest median size of the kinks between straight lines, in multiples of the rounding error.
 const KINK: f64 = 10.0;
-/// Fewest samples from kink to kink.
+/// Smallest median distance between kinks, samples.
 const APART: f64 = 3.0;
-/// Shortest time for which a frozen value stays constant: in s, and in usual times between changes.
+/// A constant value is frozen if it lasts longer than both limits: a time in s, and a number of usual times between
+/// changes.
 pub(super) const FROZEN_S: f64 = 0.5;
 const FROZEN_STEPS: f64 = 20.0;
-/// Samples on both sides whose median a spike is compared with.
+/// Number of samples on each side that form the median with which a spike is compared.
 const AROUND: usize = 4;
-/// Least size of a spike, in robust standard deviations, and in parts of the usual value.
+/// Smallest deviation of a spike from that median: in robust standard deviations, and relative to the median
+/// magnitude.
 const FAR_SD: f64 = 10.0;
 const FAR_PART: f64 = 0.4;
 
@@ -75,10 +77,10 @@ impl Quality {
     }
 }
 
-/// The column in which spikes are looked for: water in a pitot, a loose hose.
+/// The column in which spikes are looked for. Water in the pitot tube or a loose hose causes them.
 const SPIKY: &str = "airspeed_mps";
 
-/// Whether a column is of a sensor whose value never stays constant in flight.
+/// Whether a column comes from a sensor whose value never stays constant in flight.
 fn hangs(column: &str) -> bool {
     let inertial = ["roll_rad", "pitch_rad", "yaw_rad", "p_radps", "q_radps", "r_radps"];
     let air = ["airspeed_mps", "alpha_rad", "beta_rad"];
@@ -86,7 +88,7 @@ fn hangs(column: &str) -> bool {
     [&inertial[..], &air, &path].iter().any(|group| group.contains(&column))
 }
 
-/// The decimal step of the values, down to 1e-9; 0 of values that have none.
+/// The decimal step to which the values are rounded, at least 1e-9; 0 if there is none.
 fn quantum(values: &[f64]) -> f64 {
     let few: Vec<f64> = values.iter().step_by(1 + values.len() / 500).copied().collect();
     let whole = |k: &i32| {
@@ -96,7 +98,7 @@ fn quantum(values: &[f64]) -> f64 {
     (0..=9).find(whole).map_or(0.0, |k| 10f64.powi(-k))
 }
 
-/// Rate of the corners, Hz, if the values are linear in between; `None` for other channels.
+/// Rate of the kinks, Hz, if the values are linear between them; `None` for other channels.
 fn kinks(times: &[f64], values: &[f64], period: f64, quantum: f64) -> Option<f64> {
     let span = |f: fn(f64, f64) -> f64| values.iter().copied().reduce(f).unwrap_or(0.0);
     let range = span(f64::max) - span(f64::min);
@@ -120,8 +122,8 @@ fn kinks(times: &[f64], values: &[f64], period: f64, quantum: f64) -> Option<f64
     let gaps: Vec<f64> = bent.windows(2).map(|w| (w[1].0 - w[0].0) as f64).collect();
     let lines = 2 * moving >= ENOUGH && straight as f64 > STRAIGHT * moving as f64;
     let sharp = quantile(&sizes, 0.5) > KINK * rounding;
-    // A single kink, as of a held command, does not show interpolation: several kinks with straight lines between
-    // them do.
+    // A single kink, such as that of a held command, does not show interpolation. Several kinks with straight lines
+    // between them do.
     let apart = bent.len() >= 2 && quantile(&gaps, 0.5) >= APART;
     (lines && sharp && apart).then(|| 1.0 / (quantile(&gaps, 0.5) * period))
 }
@@ -135,7 +137,8 @@ fn steps(times: &[f64]) -> Vec<f64> {
     times.windows(2).map(|w| w[1] - w[0]).collect()
 }
 
-/// The intervals of one value, `stays` (from, to, s), that are long for a channel with `values` at `times` (s).
+/// Selects from the intervals of constant value, `stays` (from, to, s), those that count as frozen for a channel with
+/// `values` at `times` (s).
 pub(super) fn frozen_of(
     column: &str,
     times: &[f64],
@@ -150,14 +153,14 @@ pub(super) fn frozen_of(
     stays
 }
 
-/// Time from which a constant value counts as frozen, s. `None` if there are too few changes.
+/// Time after which a constant value counts as frozen, s. `None` if there are too few changes.
 fn frozen_s(changes: &[f64]) -> Option<f64> {
     let usual = quantile(&steps(changes), 0.9);
     let enough = changes.len() >= ENOUGH / 2 && !usual.is_nan();
     enough.then(|| FROZEN_S.max(FROZEN_STEPS * usual))
 }
 
-/// Intervals in which one value other than zero stays for much longer than usual.
+/// Intervals (from, to, s) in which one nonzero value stays for much longer than usual.
 fn frozen(times: &[f64], values: &[f64], changes: &[f64]) -> Vec<(f64, f64)> {
     let Some(limit) = frozen_s(changes) else { return Vec::new() };
     let mut out = Vec::new();
@@ -175,7 +178,7 @@ fn frozen(times: &[f64], values: &[f64], changes: &[f64]) -> Vec<(f64, f64)> {
     out
 }
 
-/// Excursions far beyond the neighbours: how many, and the largest.
+/// Number of spikes, and the value of the largest one.
 fn spikes(values: &[f64]) -> (usize, f64) {
     let usual = quantile(&values.iter().map(|x| x.abs()).collect::<Vec<_>>(), 0.5);
     let middle = |i: usize| {
@@ -195,7 +198,7 @@ fn spikes(values: &[f64]) -> (usize, f64) {
 mod tests {
     use super::*;
 
-    /// Noise that no rounding makes, from a fixed sequence.
+    /// Deterministic noise for sample `i`, which is not rounded.
     fn noise(i: usize) -> f64 {
         ((i as f64 * 12.9898).sin() * 43758.5453).fract()
     }
@@ -210,7 +213,7 @@ mod tests {
 
     #[test]
     fn lines_between_slow_samples_are_found_with_the_rate_of_the_samples() {
-        // A sample each 0.25 s, a straight line between, five decimals.
+        // A sample every 0.25 s, with straight lines between them, rounded to five decimals.
         let line = |i: usize| {
             let (k, f) = (i / 25, (i % 25) as f64 / 25.0);
             rounded(noise(k) * (1.0 - f) + noise(k + 1) * f)

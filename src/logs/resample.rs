@@ -1,4 +1,4 @@
-//! A channel read at any time: interpolated, held, its angles unwrapped.
+//! Reads a channel at any time: interpolates or holds its samples, and unwraps its angles.
 
 use std::borrow::Cow;
 use std::cell::Cell;
@@ -11,25 +11,25 @@ use super::mapping::rule::{Fill, Rule};
 /// Two times this close are the same, s: logs count microseconds or milliseconds.
 pub(super) const SAME_S: f64 = 1e-6;
 
-/// A track made ready to be read at any time.
+/// The samples of a track, prepared for reading at any time.
 pub(super) struct Reader<'a> {
     times: &'a [f64],
     series: Cow<'a, [Vec<f64>]>,
     /// The longest time between two samples that is bridged, s.
     limit: f64,
     to: Target,
-    /// Where the last row's time was found.
+    /// Index in `times` at which the search for the next row begins.
     last: Cell<usize>,
 }
 
-/// Destination of a track's series.
+/// The columns that a track fills.
 enum Target {
     Attitude,
     Column { place: Place, held: bool, wraps: bool },
 }
 
 impl<'a> Reader<'a> {
-    /// The reader of a rule's data; `limit` is the longest time (s) that a value is carried over.
+    /// Prepares the samples of `rule`. `limit` is the longest time (s) for which a value is carried over.
     pub(super) fn new(
         rule: &Rule,
         times: &'a [f64],
@@ -78,7 +78,8 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Changes the signs of quaternions so that the dot product of neighbours is positive: q and −q are one attitude.
+/// Changes the signs of quaternions so that successive ones have a positive dot product. q and −q are the same
+/// attitude.
 fn one_sided(q: &mut [Vec<f64>]) {
     for i in 1..q[0].len() {
         let dot: f64 = q.iter().map(|s| s[i] * s[i - 1]).sum();
@@ -88,7 +89,7 @@ fn one_sided(q: &mut [Vec<f64>]) {
     }
 }
 
-/// Roll, pitch, yaw of a quaternion of about unit length.
+/// Roll, pitch and yaw (rad) of a quaternion, w first; `None` if its norm is far from one.
 fn euler([w, x, y, z]: [f64; 4]) -> Option<[f64; 3]> {
     let n = (w * w + x * x + y * y + z * z).sqrt();
     if !(n > 0.5 && n < 2.0) {
@@ -114,7 +115,7 @@ struct At {
 }
 
 impl At {
-    /// The place of `t`, looked for from a `place` before it first: rows mostly come in order.
+    /// Finds `t` among `times`. The search begins at the index `place`, because rows mostly come in order of time.
     fn near(t: f64, times: &[f64], place: usize) -> At {
         let passed = |x: &f64| *x <= t + SAME_S;
         let ahead = times.get(place..).unwrap_or_default();
@@ -145,15 +146,15 @@ impl At {
     }
 }
 
-/// The largest size of an angle in radians: a heading may run to 2π, a roll angle to π.
+/// Largest magnitude of an angle in radians: 2π for a heading, π for a roll angle.
 fn largest(column: &str) -> f64 {
     (if column == "yaw_rad" { TAU } else { PI }) + 1e-3
 }
 
-/// Share of the samples of an angle that may be damaged.
+/// Largest share of damaged samples in a column that is still taken as an angle.
 const DAMAGED: f64 = 0.01;
 
-/// Whether a series can be radians at all. Wrapping a series that is larger would hide that it is in degrees.
+/// Whether a series can be in radians. Wrapping a series in degrees would hide its wrong unit.
 fn is_angle(series: &[f64], column: &str) -> bool {
     let limit = largest(column);
     let beyond = series.iter().filter(|x| !is_within(**x, limit)).count();
@@ -164,7 +165,7 @@ fn is_within(angle: f64, limit: f64) -> bool {
     angle.abs() <= limit
 }
 
-/// Makes `angles` continuous. A damaged one, larger than `limit`, becomes NaN.
+/// Removes the jumps of 2π from `angles`. An angle larger than `limit` is damaged and becomes NaN.
 fn unwrap(angles: &mut [f64], limit: f64) {
     let mut last: Option<f64> = None;
     for angle in angles {

@@ -1,15 +1,16 @@
-//! ROS 2 bags in MCAP read into topics: those of MAVROS, of `px4_msgs`, and any other that a mapping names.
+//! Reads ROS 2 bags in MCAP into topics: those of MAVROS and `px4_msgs`, and any other that a mapping names.
 //!
-//! A chunk is unpacked as it is read, only messages that are asked for are kept, and reading goes on behind damage.
+//! Chunks are unpacked while they are read. Only requested messages are kept. Reading resumes after damage.
 //!
 //! The time of a message is its stamp: `timestamp_sample` or `timestamp` of `px4_msgs`, `header.stamp` of others. A
-//! message without one has the recorder's time, moved to the clock of the stamps. Where the stamps jump against the
-//! recorder's time by more than [`JUMP_S`], as PX4's do when they are synchronised, the recorder's time bridges it.
+//! message without a stamp has the recorder's time, converted to the clock of the stamps. Stamps may jump relative to
+//! the recorder's time, as PX4's do at time synchronisation. A jump of more than [`JUMP_S`] is removed by means of
+//! the recorder's time.
 //!
-//! Topics of `px4_msgs` have the names and fields of ULog (`/fmu/out/vehicle_status_v1` is `vehicle_status`), those of
-//! MAVROS begin behind `/mavros/`, others have their own name without the first slash.
+//! Topics of `px4_msgs` have the names and fields of ULog (`/fmu/out/vehicle_status_v1` is `vehicle_status`). The
+//! name of a MAVROS topic is the part after `/mavros/`. Other topics keep their name without the first slash.
 //!
-//! Not read: definitions in `ros2idl`, messages in other encodings than CDR, bags of several files at once.
+//! Not read: definitions in `ros2idl`, messages in encodings other than CDR, bags of several files.
 
 mod cdr;
 mod chunk;
@@ -30,42 +31,42 @@ use chunk::Body;
 use records::{bytes, op};
 use streams::Streams;
 
-/// Bytes of a record's header: code and length.
+/// Size of a record's header (code and length), bytes.
 const HEAD: usize = 9;
-/// Bytes of a message's header: channel, sequence number and two times.
+/// Size of a message's header (channel, sequence number and two times), bytes.
 const MESSAGE: usize = 22;
-/// The longest message or definition that is read, bytes; longer ones are counted only.
+/// The longest message or definition that is read, bytes; longer messages are only counted.
 const LONGEST: u64 = 1 << 20;
-/// Bytes that are looked at to tell a record from damage.
+/// Number of bytes by which a record is distinguished from damage.
 const LOOK: usize = 4096;
-/// Jump of the stamps against the recorder's time that is bridged, s.
+/// Jump of the stamps relative to the recorder's time above which it is removed, s.
 const JUMP_S: f64 = 5.0;
 
 struct Reader<'w> {
     streams: Streams<'w>,
-    /// The bytes of a record.
+    /// The bytes of the present record.
     buffer: Vec<u8>,
-    /// Whether the last bytes were a record.
+    /// Whether the last bytes were a valid record.
     in_step: bool,
-    /// Bytes that belong to no record.
+    /// Number of bytes that belong to no record.
     skipped: usize,
     /// Seconds lost at each damaged place; NaN until the next message.
     holes: Vec<f64>,
     /// The recorder's time of the last message, ns since 1970.
     last_ns: Option<u64>,
     chunks: usize,
-    /// Chunks that could not be read to their end, and the reason of the first.
+    /// Number of chunks that could not be read to their end, and why the first could not.
     broken: usize,
     reason: String,
-    /// Chunks whose content does not have its checksum.
+    /// Number of chunks with a wrong checksum.
     unequal: usize,
-    /// Bytes that the last record lacks.
+    /// Number of bytes that are missing from the last record.
     lacking: u64,
-    /// Whether the file's end was seen.
+    /// Whether an end record of the file was read.
     ended: bool,
 }
 
-/// Reads the topics with their fields that `wanted` names; everything else is counted.
+/// Reads the fields for which `wanted(topic, field)` is true. Messages of all other topics are counted.
 pub(super) fn read<'a>(
     source: &'a mut dyn Read,
     wanted: &dyn Fn(&str, &str) -> bool,
@@ -109,12 +110,12 @@ pub(super) fn read<'a>(
 impl Reader<'_> {
     /// Code and length of the record at the beginning of `view`; `None` if it cannot be one.
     ///
-    /// Chunks and their indices state their length twice, which must agree. Where the file is damaged, only a chunk or
-    /// a message on a known channel shows that it is readable again.
+    /// Chunks and their indices state their length twice, and both values must agree. After damage, reading resumes
+    /// only at a chunk or at a message on a known channel.
     fn head(&self, view: &[u8]) -> Option<(u8, u64)> {
         let (code, length) = (*view.first()?, u64::from_le_bytes(bytes(view, 1)?));
         let body = &view[HEAD..];
-        // A record that the file's end cuts is judged by what there is of it.
+        // A record that is cut off by the end of the file is judged by its first bytes.
         let agrees = match code {
             op::CHUNK => chunk::agrees(body, length),
             op::MESSAGE_INDEX => {
@@ -141,7 +142,7 @@ impl Reader<'_> {
         if code == op::CHUNK {
             self.chunk(&mut body);
         } else {
-            // Too few bytes are counted below.
+            // Missing bytes are counted below.
             let _ = self.record(code, length, &mut body);
         }
         self.lacking += body.finish();
@@ -155,14 +156,14 @@ impl Reader<'_> {
         window.skip(1);
     }
 
-    /// Notes that messages are lost before the next one.
+    /// Records a loss of messages. Its duration follows from the time of the next message.
     fn hole(&mut self) {
         if self.in_step {
             self.holes.push(f64::NAN);
         }
     }
 
-    /// Reads the records that `from` holds, to its end.
+    /// Reads all records in `from`.
     fn records(&mut self, from: &mut dyn Read) -> io::Result<()> {
         loop {
             let mut head = [0; HEAD];
@@ -178,7 +179,7 @@ impl Reader<'_> {
     /// Reads a record of `length` bytes from `from`.
     ///
     /// # Errors
-    /// `from` ends before it, or cannot be read.
+    /// `from` ends within the record, or cannot be read.
     fn record(&mut self, code: u8, length: u64, from: &mut dyn Read) -> io::Result<()> {
         self.buffer.clear();
         match code {
@@ -209,13 +210,13 @@ impl Reader<'_> {
         }
     }
 
-    /// Reads `length` bytes more into the buffer, which grows with what there is.
+    /// Appends `length` bytes of `from` to the buffer. The buffer grows only with the bytes that exist.
     fn fill(&mut self, length: u64, from: &mut dyn Read) -> io::Result<()> {
         let read = from.take(length).read_to_end(&mut self.buffer)?;
         if read as u64 == length { Ok(()) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
     }
 
-    /// Notes the recorder's time of a message, by which lost ones are measured.
+    /// Records the recorder's time of a message, ns since 1970. It ends a loss of messages.
     fn passed(&mut self, log_ns: u64) {
         if let Some(hole) = self.holes.last_mut().filter(|hole| hole.is_nan()) {
             let last = self.last_ns.unwrap_or(log_ns);
@@ -266,7 +267,7 @@ impl Reader<'_> {
     }
 }
 
-/// Passes over `length` bytes.
+/// Skips `length` bytes.
 fn pass(length: u64, from: &mut dyn Read) -> io::Result<()> {
     let passed = io::copy(&mut from.take(length), &mut io::sink())?;
     if passed == length { Ok(()) } else { Err(io::ErrorKind::UnexpectedEof.into()) }

@@ -1,23 +1,23 @@
-//! Usable rows of a table, and the reasons against the others.
+//! Separates the usable rows of a table from the others, and counts why those are unusable.
 
 use super::Sample;
 use super::columns::{COLUMNS, NEEDED, index};
 
 /// Share of unusable rows above which a log is refused.
 const REFUSED_SHARE: f64 = 0.05;
-/// Smallest true airspeed that a pitot at rest shows by noise about zero, m/s.
+/// Most negative true airspeed that noise about zero explains in a pitot tube at rest, m/s.
 const PITOT_AT_REST: f64 = -5.0;
-/// A column with values in less than this share of the rows is taken as that of a slower sensor.
+/// A column with values in less than this share of the rows is taken as that of a slow sensor.
 const FILLED_SHARE: f64 = 0.95;
-/// Fewest rows that the column of a slower sensor fills. A sensor that failed fills fewer.
+/// Smallest number of values in the column of a slow sensor. Fewer values mean that the sensor failed.
 const ENOUGH: usize = 50;
-/// Row numbers kept in the report of unusable rows.
+/// Largest number of row numbers in the report of unusable rows.
 const ROWS_NAMED: usize = 20;
 
-/// Whether a log with many unusable rows is read all the same.
+/// Whether a log with many unusable rows is accepted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tolerance {
-    /// More than 5 % of unusable rows refuse the log.
+    /// A log with more than 5 % unusable rows is refused.
     #[default]
     Strict,
     /// Unusable rows are dropped, however many.
@@ -29,11 +29,11 @@ pub enum Tolerance {
 enum Reason {
     /// A field is not a number, or fields are missing.
     Unreadable,
-    /// A needed column is empty.
+    /// A required column is empty.
     Incomplete,
     /// An angle or an airspeed that no aircraft shows, or an infinite number in any column.
     Impossible,
-    /// Its time is not later than that of the row before.
+    /// The time is not later than that of the row before.
     OutOfOrder,
 }
 
@@ -54,19 +54,19 @@ pub(super) struct Rows {
     pub total: usize,
     /// Number of rows that were dropped.
     pub dropped: usize,
-    /// The numbers of the first of them.
+    /// Numbers of the first dropped rows.
     pub dropped_rows: Vec<usize>,
     /// Rows dropped for each reason.
     counts: [usize; Reason::ALL.len()],
-    /// Needed columns that may be empty in a row, by their place in [`NEEDED`].
+    /// Required columns that may be empty in a row, in the order of [`NEEDED`].
     sparse: [bool; NEEDED.len()],
-    /// Time of the last usable row that was counted and not kept, s.
+    /// Time of the last usable row that was counted without being kept, s.
     counted_s: Option<f64>,
 }
 
 impl Rows {
-    /// An empty table. Columns that `rows` fill only now and then, such as those of a slow sensor beside a fast one,
-    /// may be empty in a row.
+    /// An empty table. Columns that only some of `rows` fill, such as those of a slow sensor beside a fast one, may
+    /// be empty in a usable row.
     pub fn with_sparse_columns_of(rows: &[Sample]) -> Rows {
         let sparse = NEEDED.map(|name| {
             let get = index(name).map(|i| COLUMNS[i].1);
@@ -84,13 +84,13 @@ impl Rows {
         self.counted_s = usable.map(|row| row.time_s).or(self.counted_s);
     }
 
-    /// Counts the rows that it would take, without taking them.
+    /// Counts the usable and the other rows without keeping any.
     pub fn counted(mut self, rows: &[Sample]) -> Rows {
         rows.iter().enumerate().for_each(|(i, row)| self.count(i + 1, Some(*row)));
         self
     }
 
-    /// Takes the usable rows in place, because memory may hold only one table of a long log.
+    /// Keeps the usable rows. They stay in the memory of `rows`, because there may be no room for a second table.
     pub fn taken(mut self, mut rows: Vec<Sample>) -> Rows {
         let mut kept = 0_usize;
         for i in 0..rows.len() {
@@ -104,8 +104,8 @@ impl Rows {
         Rows { samples: rows, ..self }
     }
 
-    /// Counts row `number`, and returns it if it is usable after a row at the time `last` (s). `None` is a row that
-    /// could not be read.
+    /// Counts row `number` and returns it if it is usable. `row` is `None` if it could not be read. `last` is the
+    /// time of the usable row before it, s.
     pub fn judged(
         &mut self,
         number: usize,
@@ -131,14 +131,14 @@ impl Rows {
         }
     }
 
-    /// Takes every row that is later than the last one, complete or not.
+    /// Keeps a row, complete or not, if it is later than the last kept one.
     pub fn take_incomplete(&mut self, number: usize, sample: Sample) {
         let last = self.samples.last().map(|last| last.time_s);
         let later = self.later(number, sample, last);
         self.samples.extend(later);
     }
 
-    /// Counts row `number`, and returns it, complete or not, if it is later than `last` (s).
+    /// Counts row `number` and returns it, complete or not, if it is later than `last` (s).
     pub fn later(&mut self, number: usize, sample: Sample, last: Option<f64>) -> Option<Sample> {
         let later = last.is_none_or(|last| sample.time_s > last);
         if later && sample.time_s.is_finite() {
@@ -148,20 +148,20 @@ impl Rows {
         self.judged(number, None, last)
     }
 
-    /// The first dropped row, if there are too many of them.
+    /// Number of the first dropped row, if so many were dropped that the log is refused; else `None`.
     pub fn refused(&self, tolerance: Tolerance) -> Option<usize> {
         let poor = self.dropped as f64 > REFUSED_SHARE * self.total as f64;
         let first = self.dropped_rows.first().copied();
         if tolerance == Tolerance::Strict && poor { first } else { None }
     }
 
-    /// Why rows were dropped, with counts.
+    /// Why rows were dropped, in words, with counts.
     pub fn reasons(&self) -> String {
         let said = Reason::ALL.iter().zip(self.counts).filter(|(_, count)| *count > 0);
         said.map(|((_, text), count)| format!("{count} {text}")).collect::<Vec<_>>().join(", ")
     }
 
-    /// Why a sample cannot be used after a row at the time `last` (s).
+    /// Why a sample is unusable; `None` if it is usable. `last` is the time of the usable row before it, s.
     fn fault(&self, s: &Sample, last: Option<f64>) -> Option<Reason> {
         let missing = NEEDED
             .iter()
@@ -183,7 +183,7 @@ impl Rows {
     }
 }
 
-/// The sample with an airspeed of zero where the pitot shows its noise about zero.
+/// The sample, with the airspeed set to zero if it is the noise of a pitot tube at rest.
 fn at_rest(mut sample: Sample) -> Sample {
     if (PITOT_AT_REST..0.0).contains(&sample.airspeed_mps) {
         sample.airspeed_mps = 0.0;
@@ -213,7 +213,7 @@ mod tests {
 
     #[test]
     fn a_pitot_at_rest_costs_no_row() {
-        // −3.6 to −1.1 m/s stand in a PX4 log before its flight; −20 m/s is another unit or a fault
+        // a PX4 log has −3.6 to −1.1 m/s before its flight; −20 m/s is a wrong unit or a fault
         let mut rows = Rows::default();
         for (k, airspeed) in [-3.6, -1.1, 0.2, 17.0, -20.0].into_iter().enumerate() {
             take(&mut rows, k + 1, Some(row(k as f64, airspeed)));
@@ -225,7 +225,7 @@ mod tests {
 
     #[test]
     fn a_slow_sensor_beside_a_fast_one_costs_no_row() {
-        // airspeed at 5 Hz in rows of 50 Hz: nine of ten fields are empty
+        // airspeed at 5 Hz in rows at 50 Hz: nine of ten fields are empty
         let airspeed = |k: usize| if k.is_multiple_of(10) { 17.0 } else { f64::NAN };
         let all: Vec<Sample> = (0..1000).map(|k| row(k as f64 * 0.02, airspeed(k))).collect();
         let mut rows = Rows::with_sparse_columns_of(&all);

@@ -9,13 +9,13 @@ use greylag_num::statistics::mean;
 /// 0.2° of sideslip at Cnβ = 0.07/rad, which is less than the noise of a vane (0.3°). Ten seconds of doublets of 5° in
 /// ten minutes of flight have 0.6°.
 pub const MOVES_RAD: f64 = 0.0035;
-/// The same for a command, as a fraction of the unknown travel. 1 % of a travel of 25° is 0.25°. It exceeds the dead
-/// band of a servo (some 4 µs of 500 µs).
+/// The same limit for a command, as a fraction of the unknown travel. 1 % of a travel of 25° is 0.25°. It exceeds the
+/// dead band of a servo (about 4 µs of 500 µs).
 const MOVES_PART: f64 = 0.01;
 /// Smallest number of rows in flight for a decision.
 const ENOUGH: usize = 50;
 
-/// How a rudder moves in flight: the standard deviation.
+/// Movement of the rudder in flight, as a standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RudderMotion {
     /// Standard deviation of the deflection, rad.
@@ -34,7 +34,7 @@ impl RudderMotion {
         sd(|s| s.rudder_cmd).filter(|sd| *sd > MOVES_PART).map(RudderMotion::Command)
     }
 
-    /// Standard deviation of the rudder relative to that which counts as movement.
+    /// Standard deviation of the rudder, as a multiple of the smallest one that counts as movement.
     pub fn size(self) -> f64 {
         match self {
             RudderMotion::Deflection(sd) => sd / MOVES_RAD,
@@ -72,7 +72,7 @@ fn spread(rows: &[Sample], get: fn(&Sample) -> f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Rows at `airspeed` whose rudder steps by ± `amplitude`.
+    /// Rows at `airspeed` (m/s). `set` writes the rudder of each row; its argument is +1 and −1 in turn.
     fn rows(airspeed: f64, set: impl Fn(&mut Sample, f64)) -> Vec<Sample> {
         let row = |k: usize| {
             let mut sample = Sample { airspeed_mps: airspeed, ..Sample::default() };

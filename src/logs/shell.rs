@@ -1,8 +1,8 @@
-//! Paths as words of a command line.
+//! Quotes paths for a shell command line.
 
 use std::path::Path;
 
-/// A path quoted for a shell.
+/// Returns `path` as one word of a shell command line. It is quoted if it contains special characters.
 pub fn quoted(path: &Path) -> String {
     let text = path.display().to_string();
     let plain = |c: char| c.is_alphanumeric() || "/._-+=:@%,".contains(c);

@@ -1,7 +1,8 @@
-//! The sources of a log: the instance of each topic that is read, and the other instances.
+//! Chooses the instance of each topic that is read, and lists the other instances.
 //!
-//! A vehicle may carry two pitots, a VTOL has one controller for its lift and one for its wings. The reader takes the
-//! first instance that moves, unless the vehicle's type calls for another one, and reports its choice in a finding.
+//! A topic has several instances if a vehicle carries two pitot tubes, for example, or if a VTOL has one controller
+//! for lift and one for wing-borne flight. The reader takes the first instance whose fields change, unless the
+//! vehicle's type calls for another one. A finding reports the choice.
 
 use std::collections::BTreeMap;
 
@@ -53,34 +54,35 @@ impl std::str::FromStr for Asked {
 pub struct Source {
     /// Name of the topic.
     pub topic: String,
-    /// The instance as a mapping writes it.
+    /// The instance in the syntax of a mapping file.
     pub instance: String,
-    /// Samples a second, by the median period.
+    /// Sample rate from the median sample period, Hz.
     pub rate_hz: f64,
     /// Time of the first sample, s.
     pub from_s: f64,
-    /// Time of the last one, s.
+    /// Time of the last sample, s.
     pub to_s: f64,
-    /// Whether any of its requested fields changes.
+    /// Whether any field that the rules use changes.
     pub moves: bool,
-    /// Whether it is read.
+    /// Whether the reader uses this instance.
     pub read: bool,
 }
 
-/// The instance of each topic that is read, by the topic's name.
+/// The instance that is read of each topic, by the topic's name.
 #[derive(Debug, Default)]
 pub(super) struct Choice {
     read: BTreeMap<String, u16>,
-    /// The instances that the user asked for, by the topic's name.
+    /// The instances that the user requested, by the topic's name.
     asked: BTreeMap<String, u16>,
-    /// All instances of the topics that have several.
+    /// All instances of each topic that has more than one.
     pub sources: Vec<Source>,
     /// Findings about unusual choices.
     pub findings: Vec<Finding>,
 }
 
 impl Choice {
-    /// Chooses an instance for each topic of `rules`; those that the user `asked` for take precedence.
+    /// Chooses an instance for each topic of `rules`. The instances that the user requested (`asked`) take
+    /// precedence.
     pub fn of(topics: &Topics, rules: &[Rule], asked: &[Asked]) -> Choice {
         let mut choice = Choice::default();
         let mut names: Vec<&str> = rules.iter().map(|r| r.topic.as_str()).collect();
@@ -92,7 +94,8 @@ impl Choice {
         choice
     }
 
-    /// The instance of the topic of `rule`: the one that the user asked for, else that of the rule, else the chosen one.
+    /// The instance of the topic of `rule`: the one that the user requested, else that of the rule, else the chosen
+    /// one.
     pub fn instance(&self, rule: &Rule) -> Option<u16> {
         let of = |all: &BTreeMap<String, u16>| all.get(&rule.topic).copied();
         of(&self.asked).or(rule.instance).or_else(|| of(&self.read))
@@ -142,7 +145,7 @@ impl Choice {
     }
 }
 
-/// Finding about the choice among the sources of a topic.
+/// Finding about the choice among the instances of the topic `name`; `None` if it needs no mention.
 fn said(name: &str, sources: &[Source], asked: bool) -> Option<Finding> {
     let read = sources.iter().find(|s| s.read)?;
     let list = |of: &dyn Fn(&&Source) -> bool| -> Vec<&str> {

@@ -1,8 +1,9 @@
-//! Stretches of a long log: an inspection keeps fast topics in parts of the time only, and counts the other samples.
+//! Stretches of a long log. An inspection keeps only some stretches of topics with many samples, and statistics of
+//! all samples.
 //!
-//! Units, signs, axes and delays show in some minutes of flight. A single event may lie outside the kept stretches.
-//! Gaps and values that stay constant are therefore tracked in every sample, and one sample a second is kept
-//! throughout.
+//! Some minutes of flight suffice to check units, signs, axes and delays. A single event may lie outside the kept
+//! stretches. Gaps and values that stay constant are therefore tracked in every sample, and one sample a second is
+//! kept throughout.
 
 use super::phases::Phase;
 use super::quality::FROZEN_S;
@@ -10,38 +11,39 @@ use super::quality::FROZEN_S;
 /// How much of a log is kept in memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Keep {
-    /// Every sample: what is computed from a log needs all of it.
+    /// Every sample, as computations need.
     #[default]
     All,
-    /// Of topics with more samples than [`MOST`], stretches.
+    /// Only stretches of the topics with more samples than [`MOST`].
     Stretches,
 }
 
-/// Number of samples of a topic above which every second one of its stretches is dropped.
+/// Number of kept samples of a topic above which every second stretch is dropped.
 pub(super) const MOST: usize = 65_536;
 /// Length of a stretch, s.
 pub(super) const LENGTH_S: f64 = 30.0;
-/// Largest number of halvings of the stretches.
+/// Largest number of times that the stretches are halved.
 const LEVELS: u32 = 24;
-/// Shortest time without a sample that is recorded as a gap, s, and in usual sample periods.
+/// A time without samples is recorded as a gap if it exceeds both limits: a time in s, and a number of mean sample
+/// periods.
 const PAUSE_S: f64 = 0.1;
 const PAUSE_STEPS: f64 = 3.0;
-/// Largest number of gaps of a topic, and of constant intervals of a field, that are recorded.
+/// Largest number of recorded gaps of a topic, and of recorded constant intervals of a field.
 const NOTED: usize = 4096;
-/// Time between the samples that are kept throughout, s.
+/// Time between the samples that are kept even outside the kept stretches, s.
 const COARSE_S: f64 = 1.0;
 
-/// Every 2^level-th stretch.
+/// Selection of every 2^n-th stretch, for level n.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Level(u32);
 
 impl Level {
-    /// Whether anything is left out.
+    /// Whether any stretch is dropped.
     pub fn thins(self) -> bool {
         self.0 > 0
     }
 
-    /// One of this number of stretches is kept.
+    /// The number n, where one of n stretches is kept.
     pub fn every(self) -> usize {
         1 << self.0
     }
@@ -56,7 +58,7 @@ impl Level {
         (self.0 < LEVELS).then_some(Level(self.0 + 1))
     }
 
-    /// The level of fewer stretches.
+    /// The level that keeps fewer stretches.
     pub fn sparser(self, other: Level) -> Level {
         Level(self.0.max(other.0))
     }
@@ -70,7 +72,7 @@ struct Stay {
     to_s: f64,
 }
 
-/// Statistics over every sample of a topic, kept or not.
+/// Statistics of every sample of a topic, kept or not.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Watch {
     /// Number of samples at increasing times.
@@ -79,18 +81,18 @@ pub(super) struct Watch {
     pub span_s: Option<(f64, f64)>,
     /// Longest time between two samples, s.
     pub largest_gap_s: f64,
-    /// Where samples lack for much longer than usual: from, how long, s.
+    /// Gaps that are much longer than the mean sample period: start and length, s.
     pub gaps: Vec<(f64, f64)>,
-    /// Where each field keeps one value other than zero: from, to, s.
+    /// Ended intervals in which each field keeps one nonzero value: from, to, s.
     stays: Vec<Vec<(f64, f64)>>,
     current: Vec<Stay>,
-    /// One sample a second: times, and the values of each field.
+    /// One sample a second: times (s), then the values of each field.
     pub coarse_s: Vec<f64>,
     pub coarse: Vec<Vec<f64>>,
 }
 
 impl Watch {
-    /// Takes the time (s) of a sample with the values of its fields.
+    /// Updates the statistics with a sample at `time_s` (s). A sample that is not later than the last is ignored.
     pub fn take(&mut self, time_s: f64, values: &[f64]) {
         if !time_s.is_finite() || self.span_s.is_some_and(|(_, last)| time_s <= last) {
             return;
@@ -107,7 +109,7 @@ impl Watch {
         self.stay(time_s, values);
     }
 
-    /// Keeps the sample if the last one that was kept so is a second old.
+    /// Keeps the sample if the last sample kept in this way is at least a second old.
     pub fn coarsely(&mut self, time_s: f64, values: &[f64]) {
         if self.coarse_s.last().is_none_or(|last| time_s - last >= COARSE_S) {
             self.coarse_s.push(time_s);
@@ -132,14 +134,14 @@ impl Watch {
         }
     }
 
-    /// Where a field, by its place, keeps one value other than zero: from, to, s.
+    /// Intervals in which the field with index `field` keeps one nonzero value: from, to, s.
     pub fn stays(&self, field: usize) -> Vec<(f64, f64)> {
         let ended = self.stays.get(field).into_iter().flatten().copied();
         ended.chain(self.current.get(field).and_then(long)).collect()
     }
 }
 
-/// The span of a stay that is long enough to be noted.
+/// The interval of `stay` (from, to, s), if its value is nonzero and lasts longer than `FROZEN_S`.
 fn long(stay: &Stay) -> Option<(f64, f64)> {
     let noted = stay.value != 0.0 && stay.to_s - stay.from_s > FROZEN_S;
     noted.then_some((stay.from_s, stay.to_s))
@@ -148,22 +150,22 @@ fn long(stay: &Stay) -> Option<(f64, f64)> {
 /// Statistics of a whole long log whose fast topics were inspected in stretches only.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stretches {
-    /// One of this number of stretches was inspected.
+    /// The number n, where one of n stretches was inspected.
     pub every: usize,
     /// Length of a stretch, s.
     pub length_s: f64,
-    /// Rows of the table if it were whole.
+    /// Number of rows that the whole table would have.
     pub rows: usize,
-    /// Times of its first and last row, s.
+    /// Times of the first and the last row of the whole table, s.
     pub span_s: (f64, f64),
-    /// Where rows lack: from, how long, s.
+    /// Gaps in the rows: start and length, s.
     pub gaps: Vec<(f64, f64)>,
     /// Phases of flight and ground of the whole log.
     pub phases: Vec<Phase>,
 }
 
 impl Stretches {
-    /// The note to the user.
+    /// The note to the user, in words.
     pub(super) fn said(&self) -> String {
         format!(
             "a long log of {} rows: a look at it judges units, signs and axes by one of {} stretches of {:.0} s; \
@@ -200,7 +202,7 @@ mod tests {
         assert!(near(gap, (2.99, 0.51)), "{gap:?}");
         let [stay] = watch.stays(0)[..] else { panic!() };
         assert!(near(stay, (5.0, 7.99)), "{stay:?}");
-        // Zero is a sensor that is not there.
+        // A constant zero means that the sensor is absent; it is not recorded.
         assert!(watch.stays(1).is_empty());
         assert_eq!((watch.samples, watch.coarse_s.len()), (950, 10));
     }

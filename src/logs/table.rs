@@ -1,9 +1,9 @@
-//! Resampling of channels at their own rates onto one table.
+//! Resamples channels with different sample rates onto one table.
 //!
-//! The table's times are those of the faster of attitude and rates. Continuous channels are
-//! interpolated linearly, angles unwrapped, quaternions before they become angles; commands hold.
-//! Nothing is carried across more than 0.1 s, or three sample periods of a slower channel. Gaps in
-//! the table's own times stay gaps.
+//! The table's times are those of the faster of attitude and body rates. Continuous channels are interpolated
+//! linearly: angles after unwrapping, quaternions before their conversion to angles. Commands are held. No value is
+//! carried across more than 0.1 s or, in a slower channel, three sample periods. Gaps in the table's own times stay
+//! gaps.
 //!
 //! A channel that is much slower than the table (velocity over ground at 10 Hz) fills only the row that follows each
 //! of its samples, because interpolated rows would count as measurements. The other rows stay empty; required columns
@@ -33,15 +33,15 @@ pub(super) use whole::Whole;
 const GAP_S: f64 = 0.1;
 /// The longest time that a slow channel is carried over, in its sample periods.
 const GAP_PERIODS: f64 = 3.0;
-/// Share of finite values that makes a channel usable before others of its column.
+/// A channel with at least this share of finite values is preferred to one with less.
 const GOOD_SHARE: f64 = 0.5;
-/// A preferred channel slower than this, Hz, yields to one five times as fast.
+/// A preferred channel slower than this, Hz, is replaced by one that is more than five times as fast.
 const SLOW_HZ: f64 = 10.0;
-/// A measured channel with less than this part of the table's rate fills only the rows of its own
-/// samples. Held values would repeat in a third of the rows, by which a reconstruction recognises
-/// them.
+/// A measured channel whose sample rate is below this fraction of the table's fills only the rows of its own samples.
+/// If its values were held, more than a third of them would repeat the previous value. The flight-path reconstruction
+/// drops such repeats as those of a slow sensor.
 const SPARSE: f64 = 0.65;
-/// Columns that measure the path, as opposed to inputs that drive it.
+/// Columns that are measurements in the flight-path reconstruction. The other columns are its inputs.
 const MEASURED: [&str; 9] = [
     "roll_rad",
     "pitch_rad",
@@ -54,13 +54,13 @@ const MEASURED: [&str; 9] = [
     "vd_mps",
 ];
 
-/// A rule with the times of its data. The values of one track at a time are computed: together those of a long log
-/// take as much memory as its topics.
+/// A rule with the times of its usable samples. The values are computed for one track at a time, because those of all
+/// tracks would take as much memory as the topics.
 struct Track<'a> {
     rule: Rule,
     origin: String,
     times: Cow<'a, [f64]>,
-    /// Whether it shows one and the same value all the time.
+    /// Whether all samples have the same value.
     dead: bool,
     finite_share: f64,
     rate_hz: f64,
@@ -68,7 +68,7 @@ struct Track<'a> {
 }
 
 impl Track<'_> {
-    /// The values at its times.
+    /// The values at its times: one series, or the four components of a quaternion.
     fn series(&self) -> Vec<Vec<f64>> {
         let all = self.rule.series(self.topic);
         all.map(|all| cleaned(&self.topic.time_s, all).1).unwrap_or_default()
@@ -82,18 +82,18 @@ impl Track<'_> {
         Reader::new(&self.rule, &self.times, series, self.limit_s())
     }
 
-    /// Whether the channel is sampled much more slowly than rows `period` (s) apart.
+    /// Whether the channel is a measurement whose sample period is much longer than that of the rows, `period` (s).
     fn is_sparse(&self, period: f64) -> bool {
         let measured = self.rule.columns().iter().all(|c| MEASURED.contains(c));
         measured && self.rate_hz > 0.0 && self.rate_hz * period < SPARSE
     }
 
-    /// Statistics over all of its samples, if only stretches are kept.
+    /// Statistics of all samples of the topic; `None` unless only stretches of them are kept.
     fn watch(&self) -> Option<&Watch> {
         self.topic.watch.as_deref().filter(|_| self.topic.level.thins())
     }
 
-    /// Number of its samples, those that are not kept included.
+    /// Number of usable samples, including those that are not kept.
     fn samples(&self) -> usize {
         match self.watch() {
             Some(watch) => (self.finite_share * watch.samples as f64).round() as usize,
@@ -101,7 +101,7 @@ impl Track<'_> {
         }
     }
 
-    /// Its channel, with the quality of its values.
+    /// The track as a channel. `series` are its values, whose quality is assessed.
     fn channel(&self, series: &[Vec<f64>]) -> Channel {
         let gap = self.times.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
         let column = self.rule.columns()[0];
@@ -125,14 +125,14 @@ impl Track<'_> {
     }
 }
 
-/// The table before any row is judged.
+/// The table before unusable rows are dropped.
 pub(super) struct Table {
     pub rows: Vec<Sample>,
     pub channels: Vec<Channel>,
     pub notes: Vec<String>,
     /// Required columns without data.
     pub missing: Vec<Missing>,
-    /// Instances of the topics that have several.
+    /// All instances of each topic that has more than one.
     pub sources: Vec<Source>,
     /// Findings about unusual sources.
     pub findings: Vec<Finding>,
@@ -142,7 +142,7 @@ pub(super) struct Table {
     pub whole: Option<Whole>,
 }
 
-/// A required column has no data.
+/// A required column for which the log has no data.
 pub(super) struct Missing {
     pub column: &'static str,
     pub or: Option<&'static str>,
@@ -209,9 +209,9 @@ pub(super) fn build(topics: &Topics, rules: &[Rule], asked: &[Asked]) -> Table {
     }
 }
 
-/// The needed columns that are not `filled`.
+/// The required columns that are not `filled`.
 fn lacking(rules: &[Rule], filled: impl Fn(&str) -> bool) -> Vec<Missing> {
-    // The time comes with any channel.
+    // The time, which is the first required column, comes with every channel.
     let missing = |column: &'static str, or: Option<&'static str>| {
         let of_column = rules.iter().filter(|r| r.columns().contains(&column));
         Missing { column, or, looked_for: of_column.map(Rule::origin).collect() }
@@ -221,7 +221,7 @@ fn lacking(rules: &[Rule], filled: impl Fn(&str) -> bool) -> Vec<Missing> {
     alone.chain(either.map(|(c, p)| missing(c, Some(p)))).collect()
 }
 
-/// For each column the best rule that has data.
+/// Chooses the best rule with data for each column. Also returns findings about replaced rules and absent fields.
 fn choose<'a>(
     topics: &'a Topics,
     rules: &[Rule],
@@ -238,7 +238,8 @@ fn choose<'a>(
         let filled = |t: &Track<'a>| t.rule.columns().iter().any(|c| rule.columns().contains(c));
         let taken = chosen.iter().any(filled);
         match chosen.iter_mut().find(same) {
-            // All angles are replaced together: angles and quaternion are never mixed.
+            // If a roll angle replaces a quaternion, pitch and yaw are free again and are chosen next. Otherwise they
+            // are skipped here, so that angles and a quaternion are never mixed.
             None if taken => {}
             None => chosen.push(track),
             Some(old) => {
@@ -266,14 +267,14 @@ fn choose<'a>(
     (chosen, findings)
 }
 
-/// The data of a rule: finite values at increasing times.
+/// The usable samples of a rule in the chosen `instance`: finite values at increasing times.
 fn track<'a>(topics: &'a Topics, rule: &Rule, instance: Option<u16>) -> Option<Track<'a>> {
     let instance = instance?;
     let topic = topics.topics.get(&(rule.topic.clone(), instance))?;
     track_of(topics, topic, rule, instance)
 }
 
-/// The data of a rule in an instance of its topic.
+/// The usable samples of a rule in an instance of its topic; `None` if there are none.
 fn track_of<'a>(
     topics: &Topics,
     topic: &'a Topic,
@@ -301,8 +302,8 @@ fn fill(rows: &mut [Sample], track: &Track<'_>, series: &[Vec<f64>]) {
     rows.iter_mut().for_each(|row| reader.put(row));
 }
 
-/// Fills the rows that follow the samples of `track`, rows `period` (s) apart; `true` for each row
-/// that is filled.
+/// Fills the first row at or after each sample of `track`. `period` (s) is the time between rows. The result is
+/// `true` for each row that was filled.
 fn fill_sparse(
     rows: &mut [Sample],
     track: &Track<'_>,
@@ -313,7 +314,7 @@ fn fill_sparse(
     let Some(reader) = track.reader(series) else { return fresh };
     let mut next = 0;
     for t in track.times.iter() {
-        // The first row at or after the sample: both are in order.
+        // The first row at or after the sample. Rows and samples are in order of time.
         next += rows[next..].iter().take_while(|row| row.time_s < t - SAME_S).count();
         if rows.get(next).is_some_and(|row| row.time_s - t <= period) {
             fresh[next] = true;
@@ -323,7 +324,7 @@ fn fill_sparse(
     fresh
 }
 
-/// Holds what every row needs in the rows of `track` that are not `fresh`.
+/// Fills the required columns of `track` with their last value in the rows that are not `fresh`.
 fn hold(rows: &mut [Sample], track: &Track<'_>, fresh: &[bool]) {
     if !track.rule.columns().iter().any(|c| NEEDED.contains(c)) {
         return;
@@ -341,7 +342,7 @@ fn hold(rows: &mut [Sample], track: &Track<'_>, fresh: &[bool]) {
     }
 }
 
-/// Converts equivalent into true airspeed; returns a note on the density used.
+/// Converts equivalent airspeed into true airspeed. Returns a note on the densities used.
 fn make_true(rows: &mut [Sample]) -> String {
     let mut by = [0usize; 3];
     for row in rows.iter_mut().filter(|row| row.airspeed_mps.is_finite()) {
@@ -361,7 +362,7 @@ fn make_true(rows: &mut [Sample]) -> String {
     )
 }
 
-/// Cuts the rows before all needed channels have begun, and after one has ended.
+/// Removes the rows before all required channels have begun and those after one has ended.
 fn cut_ends(rows: &mut Vec<Sample>, notes: &mut Vec<String>) {
     let whole =
         |s: &Sample| NEEDED.iter().all(|c| index(c).is_none_or(|i| COLUMNS[i].1(s).is_finite()));

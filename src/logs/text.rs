@@ -15,10 +15,11 @@ use super::stretches::Keep;
 use super::topics::period_s;
 use super::{Flight, Format, assess, derive, screening};
 
-/// The flights of a table: one for each recording in it.
+/// Reads the flights of a CSV table, one for each recording in it.
 ///
 /// # Errors
-/// The text is not a table. The error of a single flight: it lacks a needed column, or has too many unusable rows.
+/// The text is not a table. A single flight has its own error if it lacks a required column or has too many unusable
+/// rows.
 pub(super) fn read(
     source: &mut dyn BufRead,
     path: &Path,
@@ -107,7 +108,8 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
     })
 }
 
-/// The usable rows of a table that lacks no column; for inspection, however few they are.
+/// Returns the usable rows of a table that lacks no column. Too few of them are an error for a computation, and a
+/// finding for an inspection.
 fn settled(
     raw: Raw,
     path: &Path,
@@ -124,10 +126,10 @@ fn settled(
     }
 }
 
-/// Names of columns that a finding lists.
+/// Largest number of column names in a finding.
 const SHOWN: usize = 40;
 
-/// The problem of a table that lacks several columns, with those that it has.
+/// Finding about a table that lacks several columns. It also names `unknown` columns of the table.
 fn lacks(path: &Path, missing: &[CsvError], unknown: &[String]) -> Finding {
     let either = |column: &str| EITHER.iter().find(|(command, _)| *command == column);
     let named = missing.iter().filter_map(|error| match error {
@@ -150,7 +152,7 @@ fn lacks(path: &Path, missing: &[CsvError], unknown: &[String]) -> Finding {
     ))
 }
 
-/// The columns of a CSV that hold anything.
+/// A channel for each column of the table that has values.
 fn channels(raw: &Raw, mapping: &Mapping) -> Vec<Channel> {
     let mut seen = vec![[Vec::new(), Vec::new()]; COLUMNS.len()];
     for block in raw.rows.chunks(BLOCK) {

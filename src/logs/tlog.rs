@@ -1,12 +1,11 @@
-//! MAVLink telemetry logs read into topics.
+//! Reads MAVLink telemetry logs into topics.
 //!
-//! A record is the host's time (µs since 1970, big-endian) followed by a frame. The crate `mavlink`
-//! has no reader for that; frames are cut by `link::framing`, messages named by `link::wire`.
+//! A record is the host's time (µs since 1970, big-endian) followed by a frame. The crate `mavlink` has no reader for
+//! such files. The modules of `link` separate the frames and decode the messages.
 //!
 //! The time of a message is that of the sender's clock. A message without a time stamp (VFR_HUD) has only the host's
-//! time: it is converted to the sender's clock by linear interpolation between the messages around it. This is correct
-//! in lockstep too, where the host's clock is unrelated to that of the flight.
-//! The instance of a topic is system × 256 + component.
+//! time. It is converted to the sender's clock by linear interpolation between the messages around it. This is
+//! correct in lockstep too, where the host's clock is unrelated to that of the flight.
 //!
 //! The clock of a vehicle starts at zero at each boot. The log of each boot of each vehicle is a flight of its own, because
 //! its times cannot be compared with those of another boot.
@@ -25,14 +24,14 @@ use greylag_link::logged::{self, Logged, Own};
 
 /// Bytes of the host's time.
 const STAMP: usize = 8;
-/// Difference from the clock of the attitude above which a sender's time stamp counts as that of another clock, s.
+/// A time stamp that differs from the clock of its system by more than this, s, counts as that of another clock.
 const SAME_CLOCK_S: f64 = 5.0;
-/// Wrap of `time_boot_ms`, of `time_usec` where it has 32 bits, s.
+/// Time after which the 32 bits of `time_boot_ms` overflow, s.
 const WRAP_MS_S: f64 = 4_294_967.296;
 
 /// Backward jump of a vehicle's time that counts as a restart, s.
 const BACK_S: f64 = 5.0;
-/// Number of attitudes from which a further system counts as another vehicle.
+/// Number of attitude messages from which a further system counts as another vehicle.
 const VEHICLE: usize = 50;
 /// Number of successive messages that show a restart. A single message may be late or wrong.
 const BACK_FOR: usize = 5;
@@ -58,13 +57,13 @@ struct Stream {
     topic: &'static str,
     count: usize,
     entries: Vec<Entry>,
-    /// Their values; `None` of messages that are counted only.
+    /// Their values; `None` if the messages are only counted.
     values: Option<Topic>,
 }
 
 #[derive(Default)]
 struct Reader {
-    /// By the message's number and the sender.
+    /// The streams by message number and sender.
     streams: BTreeMap<(u32, u16), Stream>,
     /// Clock of each sender, by system × 256 + component.
     clocks: BTreeMap<u16, Vec<Tick>>,
@@ -73,7 +72,7 @@ struct Reader {
     others: BTreeMap<u32, usize>,
 }
 
-/// Reads the messages that `wanted` names; all others are counted only.
+/// Reads the messages that `wanted` names. All others are only counted.
 pub(super) fn read<'a>(
     source: &'a mut dyn Read,
     wanted: &dyn Fn(&str) -> bool,
@@ -152,7 +151,8 @@ impl Reader {
     }
 
     fn finish(mut self, skipped: usize, cut: usize) -> Vec<Topics> {
-        // Components of one system share its clock; the one with the most messages is the most accurate.
+        // Components of one system share its clock. The component with the most messages gives the most accurate
+        // clock.
         let mut clocks: BTreeMap<u8, Vec<Tick>> = BTreeMap::new();
         for (source, clock) in std::mem::take(&mut self.clocks) {
             let best = clocks.entry(source.to_be_bytes()[0]).or_default();
@@ -189,7 +189,7 @@ impl Reader {
         }
     }
 
-    /// All records as one boot of the only vehicle, without a copy.
+    /// Returns all records as one boot of the only vehicle. They are moved, not copied.
     fn only_life(mut self, system: Option<u8>, mut clocks: BTreeMap<u8, Vec<Tick>>) -> Topics {
         let mut out = Topics { system, ..std::mem::take(&mut self.out) };
         clocks.values_mut().for_each(|clock| clock.sort_by(|a, b| a.host_s.total_cmp(&b.host_s)));
@@ -201,7 +201,7 @@ impl Reader {
         out
     }
 
-    /// The boots of the systems that send an attitude: each system with the range of its records.
+    /// The boots of the systems that send an attitude: for each boot its system and the range of its record numbers.
     fn lives(&self, clocks: &BTreeMap<u8, Vec<Tick>>) -> Vec<(u8, Range<usize>)> {
         let mut attitudes: BTreeMap<u8, usize> = BTreeMap::new();
         for ((_, source), stream) in &self.streams {
@@ -223,7 +223,7 @@ impl Reader {
         systems.into_iter().flat_map(of).collect()
     }
 
-    /// The records `at` of `system`, one of several boots in the file.
+    /// Returns one boot of `system`: its records whose numbers lie in `at`.
     fn life(&self, system: u8, at: Range<usize>, clocks: &BTreeMap<u8, Vec<Tick>>) -> Topics {
         let whole = at == (0..usize::MAX);
         let own = |source: u16| source.to_be_bytes()[0] == system;
@@ -265,7 +265,7 @@ impl Reader {
     }
 }
 
-/// Records at which a vehicle has restarted.
+/// Numbers of the records at which a vehicle has restarted.
 fn starts(clock: &[Tick]) -> Vec<usize> {
     let back = |i: &usize| {
         let before = clock[i - 1].own_s - BACK_S;
@@ -275,13 +275,13 @@ fn starts(clock: &[Tick]) -> Vec<usize> {
     (1..clock.len()).filter(back).map(|i| clock[i].at).collect()
 }
 
-/// A sender's time, s, with the overflow of its 32 bits removed.
+/// A sender's time, s, with the overflow of its 32 bits removed. `last` is its previous time.
 fn unwrapped(own: f64, last: Option<f64>) -> f64 {
     let last = last.unwrap_or(own);
     own + ((last - own) / WRAP_MS_S).round() * WRAP_MS_S
 }
 
-/// The times of messages on their system's clock, s; the host's where the system shows none.
+/// The times of messages on the clock of their system, s. Without that clock they are the sender's own or the host's.
 fn times(entries: &[Entry], clock: Option<&Vec<Tick>>) -> Vec<f64> {
     let clock = clock.map_or(&[][..], Vec::as_slice);
     let mut after = 0;
@@ -299,7 +299,8 @@ fn times(entries: &[Entry], clock: Option<&Vec<Tick>>) -> Vec<f64> {
 /// Number of ticks that are tried in turn before a binary search.
 const STEPS: usize = 8;
 
-/// The first tick not before `host`, looked for from `from` on first: messages mostly come in order.
+/// Index of the first tick that is not before the host's time `host` (s). The search begins at the index `from`,
+/// because messages mostly come in order.
 fn place(clock: &[Tick], host: f64, from: usize) -> usize {
     let before = |c: &Tick| c.host_s < host;
     let follows = from == 0 || clock.get(from - 1).is_some_and(before);
@@ -308,7 +309,8 @@ fn place(clock: &[Tick], host: f64, from: usize) -> usize {
     step.map_or_else(|| clock.partition_point(before), |step| from + step)
 }
 
-/// The system's time at the host's time `host`, between the ticks around place `after`.
+/// The system's time (s) at the host's time `host` (s), interpolated between the ticks before and at the index
+/// `after`.
 fn interpolate(clock: &[Tick], host: f64, after: usize) -> Option<f64> {
     match (after.checked_sub(1).map(|i| clock[i]), clock.get(after)) {
         (Some(a), Some(b)) if b.host_s > a.host_s && b.host_s > host => {

@@ -1,4 +1,4 @@
-//! Content of a binary log: topics with numeric fields over time.
+//! Content of a binary log: topics whose numeric fields are time series.
 
 use std::collections::BTreeMap;
 
@@ -14,9 +14,9 @@ pub(super) struct Topic {
     pub fields: Vec<String>,
     /// The fields' values, in the order of `fields`, each as long as `time_s`.
     pub values: Vec<Vec<f64>>,
-    /// The stretches that are kept of it.
+    /// Which stretches of the topic are kept.
     pub level: Level,
-    /// Statistics over all of its samples, if only stretches are kept.
+    /// Statistics of all samples, kept or not; `None` if the log is read with `Keep::All`.
     pub watch: Option<Box<Watch>>,
 }
 
@@ -29,7 +29,7 @@ impl Topic {
         Topic { fields, values, watch, ..Topic::default() }
     }
 
-    /// Adds a sample with the values of its fields.
+    /// Adds a sample at `time_s` (s). `values` are in the order of `fields`.
     pub fn push(&mut self, time_s: f64, values: &[f64]) {
         if let Some(watch) = &mut self.watch {
             watch.take(time_s, values);
@@ -51,7 +51,7 @@ impl Topic {
         watched.filter(|_| self.level.thins()).or(self.time_s.last().copied())
     }
 
-    /// Keeps no more stretches than those of `level`.
+    /// Drops the samples outside the stretches of `level`.
     fn thin(&mut self, level: Level) {
         self.level = level;
         let mut kept = 0;
@@ -66,7 +66,7 @@ impl Topic {
         self.values.iter_mut().for_each(|column| column.truncate(kept));
     }
 
-    /// One sample a second throughout the log, if only stretches of the topic are kept.
+    /// One sample a second throughout the log; `None` if all samples of the topic are kept.
     pub fn coarse(&self) -> Option<Topic> {
         let watch = self.watch.as_ref().filter(|_| self.level.thins())?;
         let (time_s, values) = (watch.coarse_s.clone(), watch.coarse.clone());
@@ -81,7 +81,7 @@ impl Topic {
         first.is_some_and(|first| finite.any(|x| x != first))
     }
 
-    /// The place of a field.
+    /// The index of a field in `fields`.
     pub fn place(&self, name: &str) -> Option<usize> {
         self.fields.iter().position(|f| f == name)
     }
@@ -92,7 +92,7 @@ impl Topic {
     }
 }
 
-/// The median time between samples, s; 0 for fewer than two.
+/// The median time between samples, s; 0 for fewer than two samples.
 pub(super) fn period_s(times: &[f64]) -> f64 {
     let mut steps: Vec<f64> =
         times.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 0.0 && d.is_finite()).collect();
@@ -109,7 +109,7 @@ pub(super) enum Naming {
     /// By a number from 0 on.
     #[default]
     Number,
-    /// MAVLink's system/component, of which the number is system × 256 + component.
+    /// By the MAVLink sender as `system/component`. The instance number is system × 256 + component.
     Sender,
 }
 
@@ -124,11 +124,11 @@ impl Naming {
     }
 }
 
-/// Largest number of flights that are read of one file. Each has a copy of the parameters, so the thousands of restarts of a
-/// damaged file would take all memory.
+/// Largest number of flights that are read from one file. Each flight has a copy of the parameters, so the thousands
+/// of apparent restarts in a damaged file would take all memory.
 pub(super) const MOST_FLIGHTS: usize = 200;
 
-/// Finding on a file of more than [`MOST_FLIGHTS`] flights.
+/// Finding about a file with more than [`MOST_FLIGHTS`] flights.
 pub(super) fn too_many() -> Finding {
     Finding::warning(format!(
         "the clock of the file starts again more often than a log's does: the first {MOST_FLIGHTS} flights are read, the others left out"
@@ -138,15 +138,15 @@ pub(super) fn too_many() -> Finding {
 /// The content of a binary log, or of one boot of a vehicle in it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Topics {
-    /// Vehicle and boot of this flight, where the file holds several.
+    /// Vehicle and boot of this flight, in words; `None` unless the file holds several.
     pub life: Option<String>,
-    /// The MAVLink system of this flight.
+    /// The MAVLink system of this flight; `None` in other formats.
     pub system: Option<u8>,
     /// How instances are written.
     pub naming: Naming,
     /// Name and version of the firmware; empty if the log has none.
     pub firmware: String,
-    /// The requested topics, by name with instance.
+    /// The requested topics, by name and instance.
     pub topics: BTreeMap<(String, u16), Topic>,
     /// Number of records of each topic of the file, requested or not.
     pub counts: BTreeMap<(String, u16), usize>,
@@ -169,20 +169,20 @@ impl Topics {
         self.instances(name).next().map(|(_, topic)| topic)
     }
 
-    /// A field of the first instance of a topic, with its times.
+    /// The times (s) and the values of a field in the first instance of a topic.
     pub fn series(&self, name: &str, field: &str) -> Option<(&[f64], &[f64])> {
         let topic = self.first(name)?;
         Some((&topic.time_s, topic.field(field)?))
     }
 
-    /// Whether the records are those of sdlog2, the log of PX4 before ULog: of the form of DataFlash, with one record
-    /// that holds the time of all others.
+    /// Whether the log is an sdlog2 log, PX4's format before ULog. Its records look like DataFlash records, but a
+    /// record of type TIME holds the time of all others.
     pub fn of_sdlog2(&self) -> bool {
         let has = |name: &str| self.counts.contains_key(&(name.to_owned(), 0));
         self.topics.is_empty() && has("TIME") && has("STAT") && has("ATT")
     }
 
-    /// Reduces all topics that are kept in stretches to the same stretches, and their memory to what they hold.
+    /// Makes all topics of which only stretches are kept hold the same stretches, and frees their unused memory.
     pub fn align(&mut self) {
         let level = self.topics.values().fold(Level::default(), |l, t| l.sparser(t.level));
         let fast = self.topics.values_mut().filter(|t| t.level.thins() && t.level != level);

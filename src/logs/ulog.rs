@@ -1,10 +1,9 @@
-//! PX4 ULog read into topics.
+//! Reads PX4 ULog files into topics.
 //!
-//! Written here because the crates fall short (versions looked at: `px4-ulog` 0.6.1, `yule_log`
-//! 0.4.0). `px4-ulog` stops at the first inconsistent record, refuses a second registration of a
-//! message number, panics by design where a value's type changes, and decodes every field of every
-//! topic; `yule_log` brings a logger and a regular-expression engine along. Neither skips topics
-//! that nobody asked for. The independent check is pyulog (`tests/logs_crosscheck.py`).
+//! No published crate is used (examined: `px4-ulog` 0.6.1, `yule_log` 0.4.0). `px4-ulog` stops at the first
+//! inconsistent record, refuses a second registration of a message number, panics by design where a value's type
+//! changes, and decodes every field of every topic. `yule_log` depends on a logger and on a regular-expression
+//! engine. Neither can skip topics that are not needed. `tests/logs_crosscheck.py` compares the results with pyulog.
 //!
 //! Not read: logged strings, offsets of appended data (it is read in file order), defaults of
 //! parameters. Parameter changes in flight overwrite the value.
@@ -31,12 +30,12 @@ const HEADER: usize = 16;
 const RECORD: usize = 3;
 /// Bytes that are viewed at once: the longest record and the beginning of those after it.
 const LONGEST: usize = RECORD + u16::MAX as usize + 1024;
-/// Valid records in a row that show where a damaged file is readable again.
+/// Number of successive records that are checked before one is taken as valid.
 const IN_STEP: usize = 3;
-/// The kinds of records.
+/// Letters of the kinds of records.
 const KINDS: &[u8] = b"BFIMPQARDCLSO";
 
-/// Consecutive records after the present one that were found valid.
+/// The records after the present one that were found valid: their number and bytes.
 #[derive(Clone, Copy, Default)]
 struct Ahead {
     records: usize,
@@ -45,27 +44,27 @@ struct Ahead {
 
 #[derive(Default)]
 struct Reader {
-    /// Records after the last one that were checked together with it.
+    /// Records after the last accepted one that were checked together with it.
     ahead: Ahead,
     formats: BTreeMap<String, String>,
-    /// One for each topic, however often it is subscribed to.
+    /// The layout of each topic, which all its subscriptions share.
     layouts: BTreeMap<String, Rc<Layout>>,
     subscriptions: Subscriptions,
     series: Series,
     keep: Keep,
-    /// The values of a record.
+    /// The values of the present record.
     values: Vec<f64>,
     out: Topics,
     dropout_ms: u64,
     dropouts: usize,
-    /// Data records whose message number no subscription has.
+    /// Number of data records whose message number has no subscription.
     orphans: usize,
-    /// Topics whose format the file had not stated when it subscribed to them.
+    /// Topics with a subscription before the file stated their format.
     formless: BTreeSet<String>,
     short: usize,
-    /// Whether the last bytes were a record.
+    /// Whether the last bytes were a valid record.
     in_step: bool,
-    /// Bytes that belong to no record.
+    /// Number of bytes that belong to no record.
     skipped: usize,
     /// Seconds lost at each damaged place; NaN until the next valid record.
     holes: Vec<f64>,
@@ -80,11 +79,11 @@ enum Undeclared {
     Refused,
 }
 
-/// Kind of content at a place of the file.
+/// Kind of content at a position of the file.
 enum Place {
     /// A record of this many bytes, with its header.
     Record(usize),
-    /// A record that the file's end cuts.
+    /// A record that is cut off by the end of the file.
     Cut,
     /// An invalid record.
     Damage,
@@ -131,7 +130,8 @@ pub(super) fn read<'a>(
     (reader.finish(), window)
 }
 
-/// Size and kind of the record at the beginning of `view`, if any record begins like that.
+/// Length in bytes, with the header, and kind of the record at the beginning of `view`; `None` if no record begins
+/// there.
 fn header(view: &[u8]) -> Option<(usize, u8)> {
     let [low, high, kind, ..] = view else { return None };
     let size = usize::from(u16::from_le_bytes([*low, *high]));
@@ -151,7 +151,7 @@ impl Reader {
             return if believed { Place::Cut } else { Place::Damage };
         }
         let fits = match self.in_step {
-            // Its own size is not enough: the damage may have begun within it.
+            // The right size does not make a record valid, because damage may have begun within it.
             true => self.goes_on(&view[len..], len, kind),
             false => self.is_in_step(view, IN_STEP, Undeclared::Refused),
         };
@@ -182,7 +182,7 @@ impl Reader {
             }
             ahead = Ahead { records: ahead.records + 1, bytes: ahead.bytes + next };
         }
-        // What this record declares may change the judgement.
+        // After a declaration other records may be valid, so they are checked again.
         self.ahead = if kind == b'D' { ahead } else { Ahead::default() };
         true
     }
@@ -302,7 +302,7 @@ impl Reader {
         if layout.fields.is_empty() {
             return;
         }
-        // A record that is too short would be padded to many times its size.
+        // A short record is left out, because its sample would take many times its size in memory.
         if body.len() < layout.size {
             self.short += 1;
             return;
@@ -325,7 +325,7 @@ impl Reader {
         self.series.at(place).push(micros * 1e-6, &self.values);
     }
 
-    /// Adds the number of records of a subscription that ends.
+    /// Adds the records of a subscription that ends to the count of its topic.
     fn count(&mut self, old: Subscription) {
         *self.out.counts.entry(old.key).or_default() += old.count;
     }
@@ -365,7 +365,7 @@ impl Reader {
     }
 }
 
-/// Finding about losses of a damaged file.
+/// Finding about a damaged file; `None` if no byte was skipped. `holes` are the lost times, s.
 pub(super) fn damage(skipped: usize, holes: &[f64]) -> Option<Finding> {
     let lost: f64 = holes.iter().filter(|s| s.is_finite()).sum();
     (skipped > 0).then(|| {

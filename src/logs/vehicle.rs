@@ -17,14 +17,14 @@ pub enum Kind {
     FixedWing,
     /// Aircraft that hovers and flies on its wings.
     Vtol,
-    /// Vehicle without wings.
+    /// A multicopter, which has no wings.
     Multicopter,
     /// A vehicle without wings: helicopter, rover, boat.
     Other,
 }
 
 impl Kind {
-    /// The kind for people.
+    /// The name of the kind as shown to the user.
     pub fn name(self) -> &'static str {
         match self {
             Kind::FixedWing => "fixed-wing aircraft",
@@ -45,7 +45,7 @@ pub struct Vehicle {
 }
 
 impl Vehicle {
-    /// Why a log of this vehicle cannot be studied, if it cannot.
+    /// Why a log of this vehicle cannot be studied; `None` for an aircraft with wings.
     pub fn refusal(&self) -> Option<String> {
         let what = match self.kind {
             Kind::FixedWing | Kind::Vtol => return None,
@@ -111,7 +111,7 @@ fn px4(topics: &Topics) -> Option<Vehicle> {
     }
 }
 
-/// MAVROS publishes no type, but a VTOL has a state other than zero.
+/// MAVROS publishes no vehicle type. A `vtol_state` from 1 to 4 shows a VTOL.
 fn mavros(topics: &Topics) -> Option<Vehicle> {
     let (_, states) = topics.series("extended_state", "vtol_state")?;
     let vtol = states.iter().any(|state| (1.0..=4.0).contains(state));
@@ -124,7 +124,7 @@ fn ardupilot(topics: &Topics) -> Option<Vehicle> {
         return found(Kind::Vtol, "Q_ENABLE");
     }
     let firmware = topics.firmware.split_whitespace().next().unwrap_or_default();
-    // Only builds for helicopters have a swash plate, of the older name or of the newer one.
+    // Only builds for helicopters have the parameters of a swash plate, with an older or a newer name.
     let swash = |name: &String| name.starts_with("H_SV") || name.starts_with("H_SW_");
     let rotor = topics.parameters.keys().any(swash);
     match firmware {
@@ -155,7 +155,7 @@ fn telemetry(topics: &Topics) -> Option<Vehicle> {
         else {
             continue;
         };
-        // MAV_AUTOPILOT_INVALID: a camera, a gimbal, a companion.
+        // MAV_AUTOPILOT_INVALID (8) marks a camera, a gimbal or a companion.
         let of_autopilot = types.iter().zip(autopilots).filter(|(_, a)| **a != 8.0);
         kinds.extend(of_autopilot.filter_map(|(t, _)| Some((by_type(*t)?, *t))));
     }
@@ -176,14 +176,14 @@ fn telemetry(topics: &Topics) -> Option<Vehicle> {
     found(*kind, format!("HEARTBEAT.type {number}"))
 }
 
-/// The modes of ArduPlane in which it hovers.
+/// Mode numbers of ArduPlane in which the aircraft hovers.
 const HOVER_MODES: [f64; 8] = [17.0, 18.0, 19.0, 20.0, 21.0, 22.0, 23.0, 25.0];
-/// Throttle of the lift motors above which they carry, 0..1.
+/// Throttle of the lift motors (0..1) above which they count as carrying the aircraft.
 const CARRIES: f64 = 0.05;
-/// Time for which a record of QTUN counts, s. QTUN is written while the lift motors may run.
+/// Time for which a record of QTUN is taken to hold, s. QTUN is written while the lift motors may run.
 const QTUN_HOLDS_S: f64 = 0.5;
 
-/// Times outside wing-borne flight: from, to, s.
+/// Intervals outside wing-borne flight: from, to, s.
 pub(super) fn hovers(format: Format, topics: &Topics) -> Vec<(f64, f64)> {
     let mut spans = Vec::new();
     match format {
@@ -229,7 +229,7 @@ pub(super) fn hovers(format: Format, topics: &Topics) -> Vec<(f64, f64)> {
     merged(spans)
 }
 
-/// The spans in which a value that holds until the next one satisfies `is`.
+/// Intervals (from, to, s) in which a value satisfies `is`. Each value holds until the next sample.
 fn held(series: Option<(&[f64], &[f64])>, is: impl Fn(f64) -> bool) -> Vec<(f64, f64)> {
     let Some((times, values)) = series else { return Vec::new() };
     let ends = times.iter().skip(1).copied().chain([f64::INFINITY]);
@@ -237,14 +237,14 @@ fn held(series: Option<(&[f64], &[f64])>, is: impl Fn(f64) -> bool) -> Vec<(f64,
     merged(spans.map(|((from, to), _)| (*from, to)).collect())
 }
 
-/// Times at which QTUN shows throttle on the lift motors.
+/// Intervals (from, to, s) in which QTUN shows throttle on the lift motors.
 fn lift_by_qtun(topics: &Topics) -> Vec<(f64, f64)> {
     let Some((times, throttle)) = topics.series("QTUN", "ThO") else { return Vec::new() };
     let carries = times.iter().zip(throttle).filter(|(_, x)| **x > CARRIES);
     merged(carries.map(|(t, _)| (*t, t + QTUN_HOLDS_S)).collect())
 }
 
-/// Times at which the pulses drive lift motors that do not tilt forward.
+/// Intervals (from, to, s) in which the servo pulses drive lift motors that do not tilt forward.
 fn lift_by_pulses(topics: &Topics) -> Vec<(f64, f64)> {
     let tilting = topics.parameter("Q_TILT_MASK").unwrap_or(0.0) as u32;
     let least = topics.parameter("Q_M_PWM_MIN").filter(|x| *x > 0.0).unwrap_or(1000.0);
@@ -262,13 +262,13 @@ fn lift_by_pulses(topics: &Topics) -> Vec<(f64, f64)> {
     merged(spans)
 }
 
-/// The hovers, joined where less than `shortest_s` separates them: no wing-borne flight is that short.
+/// Joins the hovers that are separated by less than `shortest_s` (s), because no wing-borne flight is that short.
 pub(super) fn joined(hovers: Vec<(f64, f64)>, shortest_s: f64) -> Vec<(f64, f64)> {
     let longer = hovers.into_iter().map(|(from, to)| (from, to + shortest_s)).collect();
     merged(longer).into_iter().map(|(from, to)| (from, to - shortest_s)).collect()
 }
 
-/// The spans in order, with touching ones joined.
+/// Sorts the intervals and joins those that touch or overlap.
 fn merged(mut spans: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     spans.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut out: Vec<(f64, f64)> = Vec::new();
@@ -315,7 +315,7 @@ mod tests {
         log.parameters.extend(parameters.map(|(n, x)| (n.to_owned(), x)));
         assert_eq!(vehicle(Format::Dataflash, &log).unwrap().kind, Kind::Vtol);
         assert_eq!(hovers(Format::Dataflash, &log), [(0.0, 25.0)]);
-        // A motor that tilts pulls in forward flight as well, and shows no hover.
+        // A tilting motor also pulls in forward flight, so its pulses do not show hover.
         log.parameters.insert("Q_TILT_MASK".to_owned(), 1.0);
         assert_eq!(hovers(Format::Dataflash, &log), [(0.0, 20.0)]);
     }

@@ -5,7 +5,7 @@ use std::io::{self, Read};
 /// Bytes read at a time.
 const CHUNK: usize = 256 * 1024;
 
-/// The next bytes of a source.
+/// A buffered view of the next bytes of a source.
 pub(super) struct Window<'a> {
     source: &'a mut dyn Read,
     bytes: Vec<u8>,
@@ -21,7 +21,7 @@ impl<'a> Window<'a> {
         Window { source, bytes: Vec::new(), from: 0, ended: false, failed: None }
     }
 
-    /// The bytes that come next: at least `wanted`, fewer only at the end.
+    /// The next bytes of the source: at least `wanted`, fewer only at its end.
     pub fn view(&mut self, wanted: usize) -> &[u8] {
         if self.bytes.len() - self.from < wanted && !self.ended {
             self.fill(wanted);

@@ -112,9 +112,9 @@ pub struct Excitation {
     pub start: f64,
     /// Waveform of the excitation.
     pub shape: Shape,
-    /// Fraction (0..=1) of the controller's reaction on this axis that is applied during the excitation. With the full reaction,
-    /// a good controller would cancel the excitation before the aircraft has responded. The fraction does not concern the
-    /// control authority of a real vehicle.
+    /// Fraction (0..=1) of the controller's reaction on this axis that is applied during the excitation. The reaction is the
+    /// change of the controller's command since the start of the excitation. With the full reaction, a good controller would
+    /// cancel the excitation before the aircraft has responded.
     pub authority: f64,
 }
 
@@ -147,8 +147,8 @@ impl Excitation {
         }
     }
 
-    /// Value at `t` (s) after the start of a step of `duration` (s). `None` before the start and after the end of the
-    /// excitation.
+    /// Value at `t` (s) after the start of a schedule's step of `duration` (s). `None` before the start and after the end of
+    /// the excitation.
     pub(super) fn at(&self, t: f64, duration: f64) -> Option<f64> {
         let into = t - self.start;
         if into < 0.0 || into >= self.length() {

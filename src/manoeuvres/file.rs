@@ -108,7 +108,7 @@ impl Schedule {
         Schedule::new(named(file.name)?, file.description, steps)
     }
 
-    /// The text of a schedule file from which `Schedule::parse` gives the same schedule.
+    /// The text of a schedule file from which `Schedule::parse` reads the same schedule.
     pub fn to_toml(&self) -> String {
         let quoted = |text: &str| toml::Value::String(text.into()).to_string();
         let mut out = format!("schema = 1\nname = {}\n", quoted(&self.name));
@@ -134,7 +134,7 @@ impl Schedule {
     }
 }
 
-/// Degrees without the rounding errors of the conversion from radians.
+/// An angle rounded to 1e-9°, which removes the rounding error of the conversion from radians.
 fn tidy(degrees: f64) -> f64 {
     (degrees * 1e9).round() / 1e9
 }
@@ -243,7 +243,7 @@ impl ExcitationFile {
     }
 }
 
-/// Checks `steps`. The error is the first fault, with the number of its step.
+/// Checks that `steps` are within the bounds of a schedule. The error describes the first fault and names its step by number.
 pub(super) fn check(steps: &[Step]) -> Result<(), String> {
     if steps.is_empty() {
         return Err(
@@ -294,7 +294,7 @@ fn check_step(step: &Step) -> Result<(), String> {
         within(&format!("amplitude on {}", e.axis.name()), e.amplitude, -most, most)?;
         within("start_s", e.start, 0.0, step.duration)?;
         within("authority", e.authority, 0.0, 1.0)?;
-        // a step and a multisine may last to the end of their step of the schedule
+        // an excitation of the shape "step" or "multisine" may last to the end of the schedule's step
         let pulses = matches!(e.shape, Shape::Doublet { .. } | Shape::ThreeTwoOneOne { .. });
         if pulses || e.length() != f64::INFINITY {
             within("width_s of the whole excitation", e.length(), 0.01, step.duration - e.start)?;

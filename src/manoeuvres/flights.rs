@@ -7,10 +7,10 @@ use crate::menu::{doublet, firm, loose, pulse, push, sines, stall};
 use crate::{Schedule, Shape, Step};
 use greylag_num::stream::{Stream, stream};
 
-/// Length of each flight, s. Drawn steps that take longer extend it.
+/// Length of each flight, s. A flight is longer if its drawn steps take longer.
 pub const FLIGHT_S: f64 = 50.0;
 
-/// The three training flights of `seed`. They excite pitch, roll with yaw, and all axes at once.
+/// The three training flights of `seed`. The first excites pitch, the second roll and yaw, the third all axes at once.
 pub fn training(seed: u64) -> [Schedule; 3] {
     let flight = |k: u64, steps: fn(&mut Draw) -> Vec<Step>| {
         let name = format!("train-{k}");
@@ -31,12 +31,12 @@ pub fn testing(seed: u64) -> [Schedule; 2] {
 struct Draw(Stream);
 
 impl Draw {
-    /// A value between `low` and `high`.
+    /// A uniformly distributed value between `low` and `high`.
     fn within(&mut self, low: f64, high: f64) -> f64 {
         self.0.random_range(low..high)
     }
 
-    /// `nominal` ± 20 %.
+    /// A uniformly distributed value within 20 % of `nominal`.
     fn about(&mut self, nominal: f64) -> f64 {
         nominal * self.within(0.8, 1.2)
     }
@@ -94,21 +94,21 @@ fn two_sizes(draw: &mut Draw, axis: Axis, v: f64) -> Step {
     ))
 }
 
-/// A step with a throttle pulse up and one down at the airspeed `v` (m/s).
+/// A step with a positive and a negative throttle pulse at the airspeed `v` (m/s).
 fn throttle(draw: &mut Draw, v: f64) -> Step {
     let (up, down) = (draw.about(0.6), draw.about(0.5));
     let step = Step::hold(4.0, 0.0, draw.within(1.0, 5.0), v);
     step.with(pulse(Throttle, up, 0.4, 1.6)).with(pulse(Throttle, -down, 2.4, 1.4))
 }
 
-/// A fast roll to the bank on `side` (±1) with an aileron pulse.
+/// A fast roll to a bank of 32° to 45° on `side` (±1) at the airspeed `v` (m/s), with an aileron pulse in the same direction.
 fn roll(draw: &mut Draw, side: f64, v: f64) -> Step {
     let (bank, amplitude) = (draw.within(32.0, 45.0), draw.about(0.3));
     let step = Step::hold(2.6, side * bank, draw.within(2.0, 6.0), v);
     step.with(firm(Aileron, side * amplitude, draw.within(0.1, 0.5), 0.4))
 }
 
-/// A pull-up in a bank to `side` (±1) with an aileron pulse.
+/// A banked turn to `side` (±1) with two nose-up elevator pulses. An aileron pulse against the bank accompanies the second.
 fn pull(draw: &mut Draw, side: f64) -> Step {
     let (bank, amplitude) = (draw.within(40.0, 52.0), draw.about(0.25));
     let step = Step::hold(4.5, side * bank, 5.0, draw.within(20.0, 23.0));
@@ -116,13 +116,13 @@ fn pull(draw: &mut Draw, side: f64) -> Step {
     step.with(pulse(Elevator, -amplitude, 2.8, 0.4)).with(firm(Aileron, -0.2 * side, 2.8, 0.4))
 }
 
-/// Sideslip excited by slow aileron sines.
+/// A step in which slow aileron sines excite sideslip at the airspeed `v` (m/s).
 fn skid(draw: &mut Draw, v: f64) -> Step {
     let amplitude = draw.about(0.35);
     Step::hold(5.5, 0.0, 4.0, v).with(sines(Aileron, amplitude, 0.45, 1.1, draw.seed()))
 }
 
-/// Excites pitch, thrust and stall.
+/// Steps that excite pitch, thrust and stall.
 fn along(draw: &mut Draw) -> Vec<Step> {
     let v = draw.within(16.0, 18.0);
     vec![
@@ -140,7 +140,7 @@ fn along(draw: &mut Draw) -> Vec<Step> {
     ]
 }
 
-/// Excites roll, yaw and sideslip.
+/// Steps that excite roll, yaw and sideslip.
 fn across(draw: &mut Draw) -> Vec<Step> {
     let side = draw.side();
     vec![
@@ -159,7 +159,7 @@ fn across(draw: &mut Draw) -> Vec<Step> {
     ]
 }
 
-/// Excites all axes at three airspeeds and several banks.
+/// Steps that excite all axes at three airspeeds and several banks.
 fn mixed(draw: &mut Draw) -> Vec<Step> {
     let side = draw.side();
     let mut all = |duration: f64, roll: f64, pitch: f64, v: f64| {
@@ -188,7 +188,7 @@ fn mixed(draw: &mut Draw) -> Vec<Step> {
     steps
 }
 
-/// Random legs with doublets and sines, then a stall, a push-over and two rolls.
+/// Six random legs, alternately with doublets and with sines. A stall, a push-over and two rolls follow.
 fn other(draw: &mut Draw) -> Vec<Step> {
     let mut steps = vec![Step::hold(1.5, 0.0, 3.0, 18.0)];
     for _ in 0..3 {

@@ -1,8 +1,8 @@
 //! Flight-test schedules: attitudes and airspeeds to be held, with excitations for system identification.
 //!
-//! A schedule is a pure function of time: [`Schedule::at`] gives the target, and the excitation of the controller's command.
-//! [`Scheduled`] flies a schedule and [`Overlay`] adds its excitation to a command. [`menu`] has standard manoeuvres by name.
-//! [`flights`] draws complete flights. [`Schedule::load`] and [`Schedule::to_toml`] read and write files.
+//! A schedule is a pure function of time: [`Schedule::at`] returns the target and the excitation at a time. [`Scheduled`] is a
+//! controller that flies a schedule. [`Overlay`] adds a schedule's excitation to a command. [`menu`] has standard manoeuvres
+//! by name. [`flights`] draws complete flights. [`Schedule::load`] and [`Schedule::to_toml`] read and write files.
 
 mod excitation;
 mod file;
@@ -21,8 +21,8 @@ use greylag_physics::Command;
 pub const ROLL_MAX_DEG: f64 = 70.0;
 /// Largest |pitch angle| of a schedule, degrees.
 pub const PITCH_MAX_DEG: f64 = 35.0;
-/// Smallest and largest airspeed of a schedule, m/s. They include the menu's stall of a slow aircraft, at 0.6 of its
-/// cruise airspeed.
+/// Smallest and largest airspeed of a schedule, m/s. The smallest is below 0.6 of the cruise airspeed of a slow aircraft, at
+/// which the menu flies its stall.
 pub const AIRSPEED_MPS: [f64; 2] = [2.0, 400.0];
 /// Cruise airspeed of the aircraft for which the menu and the drawn flights are written, m/s.
 pub const CRUISE_MPS: f64 = 20.0;
@@ -65,8 +65,8 @@ pub struct Demand {
     pub target: Target,
     /// Excitation added to the controller's command.
     pub added: Command,
-    /// Fraction (0..=1) of the controller's reaction on aileron, elevator, throttle and rudder that is applied. The reaction
-    /// is the change of the controller's command since the start of the excitation.
+    /// Fraction (0..=1) of the controller's reaction that is applied, for aileron, elevator, throttle and rudder. The
+    /// reaction is the change of the controller's command since the start of the excitation.
     pub authority: [f64; 4],
 }
 
@@ -114,8 +114,8 @@ impl Schedule {
 
     /// Target and excitation at `t` (s after the start).
     ///
-    /// Before the start, it is the target of the first step. After the end, it is the target of `Schedule::after`. Both
-    /// are without excitation.
+    /// Before the start, the target is that of the first step. After the end, the target is that of `Schedule::after`. There
+    /// is no excitation at these times.
     pub fn at(&self, t: f64) -> Demand {
         let mut begins = 0.0;
         for step in &self.steps {
@@ -133,7 +133,8 @@ impl Schedule {
         Target { roll: 0.0, pitch: 0.0, airspeed }
     }
 
-    /// The same schedule with every excitation of a surface or the throttle multiplied by `factor`, limited to 0..=1.
+    /// The same schedule with weaker excitations of the surfaces and the throttle. Their amplitudes are multiplied by `factor`,
+    /// which is limited to 0..=1.
     pub fn gentler(&self, factor: f64) -> Schedule {
         let mut gentler = self.clone();
         let commands = [Axis::Aileron, Axis::Elevator, Axis::Throttle, Axis::Rudder];
@@ -143,7 +144,7 @@ impl Schedule {
         gentler
     }
 
-    /// The same schedule for an aircraft with the cruise airspeed `cruise` (m/s). All airspeeds are multiplied by its ratio to
+    /// The same schedule for an aircraft with the cruise airspeed `cruise` (m/s). All airspeeds are multiplied by `cruise` /
     /// [`CRUISE_MPS`].
     pub fn at_cruise(mut self, cruise: f64) -> Schedule {
         let factor = cruise / CRUISE_MPS;

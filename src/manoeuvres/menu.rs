@@ -29,7 +29,7 @@ impl Manoeuvre {
 pub const TURN: Manoeuvre = Manoeuvre {
     name: "turn",
     description: "A turn onto the opposite heading.",
-    // at 45° and 19 m/s the turn rate is 30 °/s
+    // at a bank of 45° and 19 m/s the turn rate is 30 °/s: a turn of 180° takes 6 s
     steps: || vec![Step::hold(6.5, 45.0, 5.0, 19.0)],
 };
 
@@ -203,15 +203,15 @@ pub const MENU: &[Manoeuvre] = &[
     },
 ];
 
-/// Slows down into the stall with the nose up and the throttle closed, then pushes the nose down. The nose is held up for
-/// 3.2 s + 0.8 s · `depth`. The menu uses a `depth` of 1, the drawn flights use 1.7 to 2.3.
+/// Slows down into the stall with the nose up and the throttle closed, then lowers the nose. The nose is held up for 3.2 s +
+/// 0.8 s · `depth`. The menu uses a `depth` of 1, the drawn flights use 1.7 to 2.3.
 pub(super) fn stall(depth: f64) -> Step {
     let up = 3.2 + 0.8 * depth;
     let step = Step::hold(up + 2.8, 0.0, 14.0, 12.0).with(pulse(Throttle, -1.0, 0.0, up));
     step.with(pulse(Pitch, (-20.0_f64).to_radians(), up, 1.2))
 }
 
-/// Pushes to a clearly negative angle of attack. `depth` (0..1) scales the elevator pulses.
+/// Pushes the nose down to a clearly negative angle of attack. `depth` (0..1) scales the elevator pulses.
 pub(super) fn push(depth: f64) -> Step {
     let step = Step::hold(4.0, 0.0, 10.0, 18.0);
     step.with(pulse(Elevator, 0.35 * depth, 1.2, 0.35)).with(pulse(
@@ -222,7 +222,7 @@ pub(super) fn push(depth: f64) -> Step {
     ))
 }
 
-/// A 3-2-1-1 on `axis` near level flight at the airspeed `v` (m/s).
+/// A 3-2-1-1 on `axis` with the unit duration `width` (s), near level flight at the airspeed `v` (m/s).
 fn step_3211(axis: Axis, amplitude: f64, width: f64, pitch_deg: f64, v: f64) -> Step {
     let shape = Shape::ThreeTwoOneOne { width };
     Step::hold(7.0 * width + 4.0, 0.0, pitch_deg - 2.0, v).with(loose(axis, amplitude, 1.5, shape))
@@ -256,7 +256,7 @@ pub(super) fn loose(axis: Axis, amplitude: f64, start: f64, shape: Shape) -> Exc
     Excitation::new(axis, amplitude, start, shape).against(authority)
 }
 
-/// The same as [`pulse`], but with the controller's full reaction.
+/// A pulse like that of [`pulse`], but with the controller's full reaction on every axis.
 pub(super) fn firm(axis: Axis, amplitude: f64, start: f64, width: f64) -> Excitation {
     Excitation::new(axis, amplitude, start, Shape::Step { width })
 }

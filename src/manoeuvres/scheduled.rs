@@ -4,18 +4,18 @@ use crate::{Demand, Schedule};
 use greylag_control::{Controller, Observation, Target};
 use greylag_physics::{Command, Time};
 
-/// A schedule in progress, whose excitation is added to a controller's commands.
+/// A schedule in progress. Its excitation is added to a controller's commands.
 #[derive(Clone, Debug)]
 pub struct Overlay {
     schedule: Schedule,
     start: Option<Time>,
-    /// The controller's commands at the start of excitations that reduce its reaction, one per control. `None` for a control
-    /// with full reaction.
+    /// For each control whose excitation reduces the controller's reaction: the controller's command at the start of this
+    /// excitation. `None` for a control with full reaction.
     held: [Option<f64>; 4],
 }
 
 impl Overlay {
-    /// An overlay of `schedule`, which has not started.
+    /// An overlay with `schedule`, which starts at the first `Overlay::demand`.
     pub fn new(schedule: Schedule) -> Overlay {
         Overlay { schedule, start: None, held: [None; 4] }
     }
@@ -36,7 +36,8 @@ impl Overlay {
         self.start.is_some_and(|start| now.since(start).as_secs_f64() >= self.schedule.duration())
     }
 
-    /// The controller's command `own` with the excitation of `demand`, clamped to its ranges.
+    /// The controller's command `own` with its reaction reduced and the excitation added as `demand` says. The result is clamped
+    /// to the ranges of the controls.
     pub fn command(&mut self, demand: &Demand, own: Command) -> Command {
         let mut of = |axis: usize, own: f64, added: f64| {
             let share = demand.authority[axis];

@@ -8,7 +8,7 @@ use greylag_num::Real;
 use greylag_physics::rigid_body::Vector;
 use greylag_physics::{AirData, Controls, State};
 
-/// Access to the forces and the residual of a model.
+/// One way to evaluate the forces and the residual of a model.
 pub(super) trait Forces: Copy {
     /// Linear acceleration (m/s²) and angular acceleration (rad/s²) in body axes.
     fn accelerations<R: Real>(
@@ -18,7 +18,7 @@ pub(super) trait Forces: Copy {
         controls: &Controls<R>,
         air: &AirData<R>,
     ) -> (Vector<R>, Vector<R>);
-    /// The residual's contribution to the rates of the state, per second.
+    /// The residual's contribution to the time derivative of the state, in units of `State` per second.
     fn learned<R: Real>(
         self,
         residual: &Residual,

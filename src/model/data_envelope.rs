@@ -1,9 +1,10 @@
 //! Envelope of a residual's training data, and the distance of a point from the data.
 //!
-//! The distance is the square root of a leverage, scaled for 99.9 % of the training samples to lie within 1. The leverage is
-//! x̂ᵀ (X̂ᵀX̂)⁻¹ x̂ of a linear regression over the training samples. Its features x̂ are 1, the network's inputs and the units
-//! of its last hidden layer. The leverage grows if inputs leave the range of the training data. It also grows if units are
-//! active that were hardly active in the training data. The variance of a Bayesian last layer is proportional to it.
+//! The distance is the square root of a leverage, scaled so that 99.9 % of the training samples lie within 1. The leverage
+//! is x̂ᵀ (X̂ᵀX̂)⁻¹ x̂ of a linear regression over the training samples. Its features x̂ are 1, the network's inputs and the
+//! units of its last hidden layer. The leverage grows if inputs leave the range of the training data, and if units are
+//! active that were hardly active in the training data. The variance of a Bayesian last layer is proportional to the
+//! leverage.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -18,7 +19,7 @@ const MOST: usize = 1 + INPUTS + ON_STACK;
 /// a second moment of zero.
 const RIDGE: f64 = 1e-4;
 
-/// Fraction of the training samples within a distance of 1.
+/// Fraction of the training samples that lie within a distance of 1.
 const WITHIN: f64 = 0.999;
 
 /// Envelope of training data in the space of a network's features.
@@ -80,7 +81,7 @@ impl DataEnvelope {
         self.whitening.len().isqrt()
     }
 
-    /// Distance of the scaled `inputs` of `network` from the training data. Within 1 lie 99.9 % of the training samples.
+    /// Distance of the scaled `inputs` of `network` from the training data. It is at most 1 for 99.9 % of the training samples.
     pub fn distance(&self, network: &Dense, inputs: &[f64; INPUTS]) -> f64 {
         let (features, count) = features(network, inputs);
         let rows = self.whitening.chunks_exact(count);
@@ -125,7 +126,7 @@ mod tests {
         assert!((beyond(&data) - 0.001).abs() < 5e-4, "{}", beyond(&data));
         let fresh: Vec<_> = (0..5000).map(|_| draw(1.0)).collect();
         assert!(beyond(&fresh) < 0.01, "{}", beyond(&fresh));
-        // each input alone gives a distance above 1 beyond the data
+        // a point that is outside the data in a single input has a distance above 1
         for k in 0..INPUTS {
             let mut point = [0.0; INPUTS];
             point[k] = 8.0;

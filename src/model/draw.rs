@@ -11,8 +11,8 @@ use greylag_physics::inputs;
 const DRAWS: u64 = 40;
 
 impl GreyBox {
-    /// Bounds of the coefficient `name` (`effect.coefficient`): those that the model states, else the physical ones for an
-    /// aircraft of this size. `None` if there is no such coefficient.
+    /// Bounds of the coefficient `name` (`effect.coefficient`): the bounds that the model states, else the physical bounds of
+    /// the catalogue for an aircraft of this size. `None` if there is no such coefficient.
     pub fn bounds_of(&self, name: &str) -> Option<(f64, f64)> {
         let stated = self.coefficients().iter().find(|c| c.name == name).and_then(|c| c.bounds);
         if let Some([least, most]) = stated {
@@ -25,8 +25,9 @@ impl GreyBox {
         Some(self.size().bounds(found))
     }
 
-    /// Draw number `k` of `seed`. Every coefficient is normally distributed about its value, with its [width](Named::width) as
-    /// standard deviation, and limited to its [bounds](GreyBox::bounds_of). Mass, inertia, actuators and the residual are unchanged.
+    /// Draw number `k` of `seed`. Every coefficient is drawn from a normal distribution about its value, with its
+    /// [width](Named::width) as standard deviation, and is clamped to its [bounds](GreyBox::bounds_of). Mass, inertia, actuators
+    /// and the residual are unchanged.
     pub fn drawn(&self, seed: u64, k: u64) -> GreyBox {
         let mut rng = stream::stream(seed, &[DRAWS, k]);
         let draw = |c: &Named| {
@@ -56,7 +57,7 @@ mod tests {
             let values = draws.iter().map(|d| d.coefficients()[i].value - c.value);
             let square = values.map(|x| x * x).sum::<f64>() / draws.len() as f64;
             assert!(square.sqrt() <= 1.15 * c.width(), "{}", c.name);
-            // a bound may cut off one side of the distribution
+            // clamping to a bound may reduce the deviation to one side
             assert!(square.sqrt() >= 0.5 * c.width(), "{}", c.name);
         }
         assert_eq!(model.drawn(7, 3).coefficients(), draws[3].coefficients());

@@ -25,9 +25,9 @@ pub struct Number {
     pub name: String,
     /// Value in the coefficient's unit.
     pub value: f64,
-    /// Standard deviation, in the unit of the value. `None` leaves the file's unchanged.
+    /// Standard deviation, in the unit of the value. `None` leaves the file's entry unchanged.
     pub sd: Option<f64>,
-    /// Bounds in the unit of the value. `None` leaves the file's unchanged.
+    /// Bounds in the unit of the value. `None` leaves the file's entry unchanged.
     pub bounds: Option<[f64; 2]>,
 }
 
@@ -40,17 +40,17 @@ pub struct Edit {
     pub airframe: String,
     /// New values of existing coefficients.
     pub changed: Vec<Number>,
-    /// Coefficients of new effects. The coefficients of one effect are adjacent. Each has the source of the effect's formula.
+    /// Coefficients of new effects, each with the source of the effect's formula. The coefficients of one effect are adjacent.
     pub added: Vec<(Number, String)>,
     /// Coefficients set to zero, each with the effect that replaces its term.
     pub dropped: Vec<(String, &'static str)>,
-    /// Replaced texts: the path of keys from the outermost, and the new text.
+    /// Entries that are replaced by a text: the path of keys from the outermost, and the new text.
     pub replaced: Vec<(&'static [&'static str], &'static str)>,
     /// Paths of effect files outside the catalogue, relative to the new model file.
     pub effect_files: Vec<String>,
     /// Flights to which the values were fitted, as text for the sources.
     pub fitted_to: String,
-    /// Constants of the installation and of flights that replace those in the file. `None` leaves the file's unchanged.
+    /// Constants of the installation and of flights that replace those in the file. `None` leaves the file's entries unchanged.
     pub known: Option<Known>,
 }
 
@@ -144,7 +144,7 @@ impl Edit {
     }
 }
 
-/// Replaces the tables of the installation and of flights in `document` by the constants in `known`.
+/// Replaces the sections `[installation]` and `[flights]` of `document` by the constants in `known`.
 fn write_known(document: &mut DocumentMut, known: &Known) {
     document.remove("installation");
     document.remove("flights");
@@ -193,8 +193,9 @@ fn entry<'a>(effects: &'a mut dyn TableLike, name: &str) -> Result<&'a mut Item,
     item.ok_or_else(|| EditError::Place(format!("effects.{name}")))
 }
 
-/// The table of an effect whose file gives the value of the coefficient `name`, the coefficient's short name, and the
-/// source of the effect. `None` if the model file has the coefficient itself or the effect's file does not define it.
+/// Finds a coefficient `name` that the model file omits, so that the effect file gives its value. Returns the effect's table
+/// in the model file, the coefficient's short name and the effect's source. `None` if the model file has the coefficient or
+/// no effect file defines it.
 fn left_to_effect_file<'a, 'b>(
     effects: &'a mut dyn TableLike,
     name: &'b str,
@@ -223,7 +224,7 @@ fn drop_coefficient(effects: &mut dyn TableLike, name: &str, by: &str) -> Result
     Ok(())
 }
 
-/// The source of a coefficient without the remark of an earlier amendment.
+/// The text "greylag amend: " followed by the original source of a coefficient, without the remark of an earlier fit.
 fn original(source: &str) -> String {
     let amended = "greylag amend: ";
     let bare = source.strip_prefix(amended).and_then(|s| s.split("; fitted to ").next());

@@ -1,4 +1,4 @@
-//! Reader of model files: TOML that names the effects and states every number with its source.
+//! Reader of model files. A model file is a TOML file that names the model's effects and states every number with its source.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -35,7 +35,7 @@ struct File {
     rigid_body: BodyFile,
     air: AirFile,
     residual: Option<String>,
-    /// Effect files, and folders of effect files, relative to this file.
+    /// Paths of effect files and of folders with effect files, relative to the model file.
     #[serde(default)]
     effect_files: Vec<String>,
     effects: toml::Table,
@@ -226,7 +226,7 @@ impl File {
     }
 }
 
-/// Rejects a model with more input effects, lags or delays than a model's memory can hold.
+/// Checks that the model has no more input effects, lags and delays than a model's memory can hold.
 fn can_be_remembered(inputs: usize, terms: &[Term]) -> Result<(), String> {
     if inputs > inputs::MOST {
         return Err(format!(
@@ -281,7 +281,8 @@ impl AirFile {
     }
 }
 
-/// Coefficients and tables of one effect from its TOML table. Missing coefficients have the values of their effect file.
+/// Coefficients and tables of one effect from its TOML table. If the effect has an effect file, missing coefficients take
+/// their values from it.
 fn effect(
     about: &Description,
     written: Option<&Written>,
@@ -329,7 +330,7 @@ fn effect(
     Ok((named, points))
 }
 
-/// The coefficient described by `about` of the effect `id`, checked against its bounds for an aircraft of `size`.
+/// The coefficient `about` of the effect `id` with the value `number`, checked against its bounds for an aircraft of `size`.
 fn checked(id: &str, about: &Coefficient, number: &Sourced, size: &Size) -> Result<Named, String> {
     let name = about.name;
     let own = number.bounds.map(|[low, high]| (low, high));

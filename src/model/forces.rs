@@ -1,10 +1,10 @@
 //! Forces and moments, accelerations and state rates of a model.
 //!
-//! Effects that need only the point are summed first, in separate code, where a planner spends most of its time. The input
-//! of the other effects, [`Base`], is computed only if a model has such effects.
+//! Effects that need only the point of evaluation (state, controls and airflow) are summed first, in separate code, where a
+//! planner spends most of its time. The input of the other effects, [`Base`], is computed only if a model has such effects.
 //!
 //! Functions with names `…_inlined` become part of their caller. A kernel compiled for several instruction sets must call
-//! only these. Other callers use the functions without this ending, which are compiled once.
+//! only these. Other callers use the functions without this suffix, which are compiled once.
 
 use super::GreyBox;
 use super::calls::{Called, Forces};
@@ -15,8 +15,8 @@ use greylag_physics::point::Base;
 use greylag_physics::rigid_body::{self, Vector};
 use greylag_physics::{AirData, Channel, Controls, Point, State, Wrench};
 
-/// Number of fixed-point passes over the effects that depend on the state's rate. Each pass reduces the error by at least a
-/// factor of two within the bounds of `unsteady_lift`, and by a factor of ten at usual values.
+/// Number of fixed-point iterations for the effects that depend on the time derivative of the state. Each iteration reduces
+/// the error by at least a factor of two within the bounds of `unsteady_lift`, and by a factor of ten at usual values.
 const RATE_PASSES: usize = 4;
 
 /// The point of evaluation: state, controls and airflow.
@@ -48,13 +48,14 @@ struct Sum<W, R> {
     wrench: Wrench<R>,
 }
 
-/// Passes each term on with the index of its coefficient in the model's list.
+/// Receiver that calls `term` with each term and the index of its coefficient in the model's list.
 struct Each<'a, F> {
     first: usize,
     term: &'a mut F,
 }
 
-/// Receiver of the terms of several effects, which is informed where each effect's coefficients start.
+/// Receiver of the terms of several effects. Before the terms of an effect, it gets the index of the effect's first
+/// coefficient.
 pub trait Starting<R>: Terms<R> {
     /// Announces the terms of the effect whose first coefficient has the index `first` in the model's list.
     fn start_at(&mut self, first: usize);
@@ -368,7 +369,7 @@ impl GreyBox {
         (acceleration, rigid_body::angular_acceleration(&body, state, moment))
     }
 
-    /// Rate ṡ of the state at `altitude` (m), in units of [`State`] per second, including the residual.
+    /// Time derivative ṡ of the state at `altitude` (m), in units of [`State`] per second, including the residual.
     pub fn rate<R: Real>(
         &self,
         state: &State<R>,

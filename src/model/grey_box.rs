@@ -33,8 +33,8 @@ pub const RUDDER: &str = "rudder_linear";
 const WIDTH: f64 = 0.15;
 
 impl Named {
-    /// Prior standard deviation: the stated one, or 15 % of the value if none is stated (`docs/explanation/diagnosis.md`, the
-    /// algebra). A coefficient of zero without a stated standard deviation is fixed.
+    /// Prior standard deviation: the stated one, or 15 % of the value if none is stated (`docs/explanation/diagnosis.md`,
+    /// "The algebra"). A coefficient of zero without a stated standard deviation is fixed.
     pub fn width(&self) -> f64 {
         self.sd.unwrap_or(WIDTH * self.value.abs())
     }
@@ -78,16 +78,16 @@ impl Term {
 /// Grey-box model ṡ = F_p(s, z; θ_p) + F_a(s, z; θ_a), eq. (19) of \[GSFM26\]: physical effects F_p on a rigid body, and
 /// a learned residual F_a.
 ///
-/// The model has parameters and equations but no flight state. All evaluations take `&self`, and one model can serve
-/// several threads. Units are SI and radians, body axes FRD. Its methods are of four kinds:
+/// The model has parameters and equations but no flight state. All evaluations take `&self`, so one model can serve
+/// several threads. Units are SI and radians, body axes are FRD. The methods are of four kinds:
 ///
 /// - Construction: [`load`](GreyBox::load) reads a model file with its airframe, [`parse`](GreyBox::parse) a text.
 ///   [`join`](GreyBox::join) adds an effect.
 /// - Change of parameters: [`set_coefficient`](GreyBox::set_coefficient),
 ///   [`set_coefficients`](GreyBox::set_coefficients), [`set_body`](GreyBox::set_body),
 ///   [`set_bounds`](GreyBox::set_bounds), [`with_widths`](GreyBox::with_widths). Values are not checked against their
-///   bounds. Mass and inertia are set with `set_body`. The public `body` is computed from them and from the effects on
-///   them at each change.
+///   bounds. Mass and inertia are set with `set_body`. At each change, the public `body` is computed from them and from
+///   the effects that modify them, such as `mass_error`.
 /// - Evaluation at an instant: [`wrench`](GreyBox::wrench), [`contributions`](GreyBox::contributions),
 ///   [`accelerations`](GreyBox::accelerations), [`rate`](GreyBox::rate), from the state and the acting deflections.
 /// - Advance by one [`STEP`](crate::STEP), 0.01 s: first [`act`](GreyBox::act) converts the actuators' positions to
@@ -108,10 +108,10 @@ pub struct GreyBox {
     pub sha256: String,
     /// Geometry, actuators and limits of the aircraft.
     pub airframe: Airframe,
-    /// Mass and inertia, including the effects on them. They are recomputed at each change of coefficients, see
+    /// Mass and inertia, including the effects that modify them. They are recomputed at each change of coefficients, see
     /// [`set_body`](GreyBox::set_body).
     pub body: RigidBody,
-    /// Mass and inertia without the effects on them.
+    /// Mass and inertia without the effects that modify them.
     pub(super) bare_body: RigidBody,
     /// Density law and gravity of the model.
     pub atmosphere: Atmosphere,
@@ -130,7 +130,7 @@ pub struct GreyBox {
     pub(super) coefficients: Vec<Named>,
     /// Number of lags and delays in formulas, at most [`LAGS`].
     pub(super) lags: usize,
-    /// Whether the link has no rudder command.
+    /// Whether the aircraft's rudder does not move, because the link has no rudder command.
     pub(super) rudder_is_left: bool,
     /// Constants of the installation and of single flights, from the model file.
     pub known: Arc<Known>,
@@ -163,13 +163,13 @@ impl GreyBox {
         self.renew();
     }
 
-    /// Sets mass and inertia. Effects on them apply to the new values.
+    /// Sets mass and inertia. Effects that modify them apply to the new values.
     pub fn set_body(&mut self, body: RigidBody) {
         self.bare_body = body;
         self.renew();
     }
 
-    /// Mass and inertia without the effects on them.
+    /// Mass and inertia without the effects that modify them.
     pub fn bare_body(&self) -> &RigidBody {
         &self.bare_body
     }
@@ -192,7 +192,8 @@ impl GreyBox {
             && self.coefficients.iter().any(yaws)
     }
 
-    /// The same model with other prior standard deviations. `sd` returns a coefficient's new one, or `None` to keep it.
+    /// The same model with other prior standard deviations. `sd` returns the new standard deviation of a coefficient, or `None`
+    /// to keep the old one.
     pub fn with_widths(mut self, sd: impl Fn(&Named) -> Option<f64>) -> GreyBox {
         for c in &mut self.coefficients {
             c.sd = sd(c).or(c.sd);
@@ -229,7 +230,7 @@ impl GreyBox {
         self.terms.iter().filter_map(|term| term.kind.written())
     }
 
-    /// Id of an effect that a search proposed and no person has accepted. `None` if there is no such effect.
+    /// Id of the first effect that a search proposed and no person has accepted. `None` if there is no such effect.
     pub fn proposed(&self) -> Option<&'static str> {
         self.written().find(|e| e.status == Status::Proposed).map(|e| e.about.id)
     }
@@ -244,7 +245,7 @@ impl GreyBox {
         self.terms.iter().filter_map(|t| Some((t.kind.describe().id, t.points.table.as_ref()?)))
     }
 
-    /// Whether the model is linear in each coefficient, in the order of the coefficients.
+    /// For each coefficient, in the order of `coefficients`, whether the model is linear in it.
     pub fn linear(&self) -> Vec<bool> {
         let mut linear = vec![false; self.coefficients.len()];
         for Term { kind, first, .. } in &self.terms {
@@ -279,7 +280,7 @@ impl GreyBox {
         }
     }
 
-    /// Deflections that act on the air at the measured positions `controls`. To be called once every
+    /// Converts the measured positions `controls` to the acting deflections. To be called once every
     /// [`STEP`](crate::STEP).
     #[inline(always)]
     pub fn act<R: Real>(&self, controls: &Controls<R>, memory: &mut InputMemory<R>) -> Controls<R> {
@@ -317,7 +318,7 @@ impl GreyBox {
         }
     }
 
-    /// Whether the measured positions act directly, without dependence on past controls.
+    /// Whether the measured positions are the acting deflections: the model has neither input effects nor lags.
     pub fn acts_at_once(&self) -> bool {
         self.inputs.is_empty() && self.lags == 0
     }
@@ -327,7 +328,7 @@ impl GreyBox {
         self.lags
     }
 
-    /// Size of the aircraft, with which the physical bounds of coefficients grow.
+    /// Size of the aircraft, which determines the physical bounds of coefficients.
     pub fn size(&self) -> Size {
         Size::new(&self.bare_body, &self.airframe.geometry).lifted_at(
             self.airframe.envelope.airspeed_min_mps,

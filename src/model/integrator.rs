@@ -36,7 +36,8 @@ impl<R> Default for Memory<R> {
 }
 
 impl<R: Real> Memory<R> {
-    /// Selects `then` where `chosen` is above zero, else this memory. If one of the two is empty, selects the other one.
+    /// Selects `then` in the SIMD lanes in which `chosen` is above zero, and this memory in the others. If one of the two
+    /// memories is empty, selects the other one.
     #[inline(always)]
     pub fn replaced(&self, chosen: R, then: &Self) -> Self {
         let (Some(mut all), Some(then)) = (self.0, then.0) else {
@@ -109,7 +110,7 @@ impl GreyBox {
         forces: impl Forces,
     ) -> State<R> {
         let (mut at, mut next) = (*s, *s);
-        // per slope: the step to the next stage, and the weight in the final sum, s
+        // for each slope, in s: the step to the next stage, and the weight in the final sum
         let stages = [
             (STEP / 2.0, STEP / 6.0),
             (STEP / 2.0, STEP / 3.0),
@@ -136,7 +137,7 @@ impl GreyBox {
         let air = self.air(s, altitude);
         let (mut acceleration, mut spin) = forces.accelerations(self, s, controls, &air);
         if let Some(residual) = &self.residual {
-            // this scheme uses only accelerations, and the residual's φ̇ and θ̇ cannot enter it
+            // this scheme uses only accelerations, so the residual's φ̇ and θ̇ have no effect
             let learned = forces.learned(residual, s, controls);
             let push = rigid_body::acceleration_of(s, &air, &learned);
             for (sum, part) in acceleration.iter_mut().zip(push) {
@@ -197,7 +198,8 @@ fn adams_bashforth<R: Real>(velocity: R, acceleration: R, last: R) -> R {
     velocity + acceleration.scale(1.5 * STEP) - last.scale(0.5 * STEP)
 }
 
-/// Components of a horizon-frame vector after a change of the heading by the angle with this sine and cosine.
+/// Transforms a vector from the horizon frame of the old heading to that of the new heading. The heading changes by the
+/// angle with the given sine and cosine.
 #[inline(always)]
 fn to_heading<R: Real>([n, e, d]: Vector<R>, (sin, cos): (R, R)) -> Vector<R> {
     [n * cos + e * sin, e * cos - n * sin, d]
@@ -234,7 +236,7 @@ pub struct Twin {
     /// Altitude above mean sea level, m.
     pub altitude: f64,
     memory: Memory,
-    /// Memory of input effects and lags. `None` before the first step, until which all controls are at rest.
+    /// Memory of input effects and lags. `None` before the first step: the controls are then at rest.
     inputs: Option<InputMemory>,
 }
 
@@ -250,7 +252,7 @@ impl Twin {
         Twin { state, actuators, altitude, memory: Memory::default(), inputs: None }
     }
 
-    /// Advances by one [`STEP`] in the simulator's order. First the state is integrated with the present actuators, then the
+    /// Advances by one [`STEP`] in the order of JSBSim. First the state is integrated with the present actuators, then the
     /// actuators receive the command.
     pub fn step(&mut self, model: &GreyBox, command: &Command) {
         let air = model.air(&self.state, self.altitude);
@@ -264,8 +266,8 @@ impl Twin {
         self.actuators.step(command, &model.airframe.actuators);
     }
 
-    /// Specific force at the centre of gravity in body axes, m/s²: the reading of an accelerometer at that point. In level
-    /// flight its z component is about −9.81.
+    /// Specific force at the centre of gravity in body axes, m/s²: the reading of an ideal accelerometer at that point. In
+    /// level flight its z component is about −9.81.
     pub fn specific_force(&self, model: &GreyBox) -> Vector<f64> {
         let air = model.air(&self.state, self.altitude);
         let measured = self.actuators.controls();

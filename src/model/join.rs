@@ -78,12 +78,12 @@ pub enum JoinError {
 }
 
 impl GreyBox {
-    /// Adds the effect `id`. `values` are those of its coefficients, in the effect's order. Coefficients whose terms the effect
+    /// Adds the effect `id` with the `values` of its coefficients, in the effect's order. Coefficients whose terms the effect
     /// replaces become zero, and stay zero in a fit.
     ///
     /// # Errors
-    /// If the effect is unknown, already present or needs a table, a value is out of bounds, the model would have too many
-    /// input effects or lags, or its mass or inertia would be unphysical.
+    /// If the effect is unknown, already present or needs a table, if a value is out of bounds, or if the model would have too
+    /// many input effects or lags, or an unphysical mass or inertia.
     pub fn join(&mut self, id: &str, values: &[f64]) -> Result<(), JoinError> {
         let (about, kind) = match (Kind::from_id(id), inputs::Kind::from_id(id)) {
             (Some(kind), _) => (kind.describe(), Ok(kind)),
@@ -127,8 +127,8 @@ impl GreyBox {
     }
 
     /// [`join`](GreyBox::join) with the largest fraction of `values` for which the change of the body
-    /// [is acceptable](greylag_physics::rigid_body::RigidBody::may_become). The fraction is in steps of 1 %. It is 100 % unless
-    /// an estimate of mass or inertia overshoots.
+    /// [is acceptable](greylag_physics::rigid_body::RigidBody::may_become). The fraction is a whole number of percent. It is
+    /// 100 % unless an estimate of mass or inertia overshoots.
     ///
     /// # Errors
     /// The same as for [`join`](GreyBox::join).
@@ -182,7 +182,7 @@ impl GreyBox {
         Err(JoinError::Values { id, expected: expected.join(", "), values: values.into() })
     }
 
-    /// Rejects an effect whose resulting mass or inertia would be unphysical.
+    /// Checks that mass and inertia stay physical with the effect.
     fn stays_physical(&self, kind: Kind, values: &[f64]) -> Result<(), JoinError> {
         let mut body = self.body;
         kind.change(values, &mut body);

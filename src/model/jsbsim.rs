@@ -1,4 +1,4 @@
-//! Export of a model as a JSBSim aircraft: its files and what they omit.
+//! Export of a model as a JSBSim aircraft.
 
 mod aerodynamics;
 mod conditions;
@@ -60,7 +60,7 @@ pub fn export_in_conditions(models: &[GreyBox], name: &str) -> Result<Exported, 
 fn left_out(model: &GreyBox) -> Vec<String> {
     let effect = |full: &str| full.split('.').next().unwrap_or_default().to_owned();
     let known = |name: &str| aerodynamics::knows(name) || engine::knows(name);
-    // the exported mass and inertia include the effects on them
+    // the exported mass and inertia already include these effects
     let of_body = |name: &str| name.starts_with("mass_error.") || name.starts_with("inertia_xz.");
     let lost = model
         .coefficients()
@@ -176,7 +176,7 @@ fn controls(conditions: &Conditions, name: &str) -> String {
          <property>{ELEVATOR}</property> </abs> </function>\n      </fcs_function>\n    </channel>\n{}  </flight_control>\n\n",
         1.0 / lag,
         engine::lag(model),
-        // 1.225 kg/m³
+        // 1.225 kg/m³ in slug/ft³
         1.225 / (LBF / FT / (FT * FT * FT)),
         conditions.weights(),
     );

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-/// Names of the trims that a flight may have, as offsets of the model's coefficients.
+/// Names of the trims that a flight may have: offsets of the model's coefficients, and a fraction of the thrust.
 pub const TRIMS: [&str; 7] = ["CD0", "CL0", "CY0", "Cl0", "Cm0", "Cn0", "thrust_share"];
 /// Names of the sensor errors in the reconstructed state: a fraction of the airspeed, then offsets of body rates, α and
 /// β. Units are in the names.
@@ -32,7 +32,7 @@ pub struct FlightConstants {
     pub source: String,
     /// The small rotation from body axes to the measured axes, about x, y and z of the body, degrees.
     pub axes_deg: Option<[f64; 3]>,
-    /// Offsets of the model's coefficients, dimensionless, in the order of [`TRIMS`]. Always `None` in an installation.
+    /// Values of the trims, dimensionless, in the order of [`TRIMS`]. Always `None` in an installation.
     pub trims: Option<[f64; TRIMS.len()]>,
     /// Errors of the sensors in the reconstructed state, in the order and units of [`SENSORS`].
     pub sensors: Option<[f64; SENSORS.len()]>,
@@ -61,7 +61,7 @@ impl Known {
     }
 
     /// Constants of `flight`. Axes and sensor errors that its entry does not state are those of the installation. `None` if
-    /// there are neither.
+    /// the file has neither an entry for the flight nor an installation.
     pub fn of(&self, flight: &str) -> Option<FlightConstants> {
         let shared = self.installation.as_ref();
         let Some(own) = self.flights.get(flight) else { return shared.cloned() };

@@ -14,9 +14,9 @@ const LATERAL: [usize; 4] = [0, 3, 5, 7];
 /// Continuous-time linear model about a condition: δṡ = a δs + b δz with z = (δa, δe, δt, δr).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rates {
-    /// Jacobian ∂ṡ/∂s, with states in the order of eq. (4), in units of the state per second and unit of the state.
+    /// Jacobian ∂ṡ/∂s, with states in the order of eq. (4), in units of the state per second, per unit of the state.
     pub a: SMatrix<f64, 8, 8>,
-    /// Jacobian ∂ṡ/∂(δa, δe, δt, δr), in units of the state per second and rad, or per unit of throttle.
+    /// Jacobian ∂ṡ/∂(δa, δe, δt, δr), in units of the state per second, per rad or per unit of throttle.
     pub b: SMatrix<f64, 8, 4>,
 }
 
@@ -108,7 +108,7 @@ fn longitudinal(all: &[Complex<f64>]) -> Vec<Mode> {
     let names: &[&'static str] = match all.len() {
         2 => &["short period", "phugoid"],
         3 if all[2].im > 0.0 => &["fast pitch", "slow pitch", "phugoid"],
-        // behind the neutral point, pitch and phugoid may join in one oscillation
+        // with the centre of gravity aft of the neutral point, a pitch mode and the phugoid may merge into one oscillation
         3 if all[1].im > 0.0 => &["fast pitch", "third oscillation", "slow pitch"],
         3 => &["short period", "airspeed", "slow airspeed"],
         _ => &["fast pitch", "slow pitch", "airspeed", "slow airspeed"],

@@ -1,4 +1,4 @@
-//! Plausibility checks of an aircraft's measures, which detect wrong units.
+//! Plausibility checks of an aircraft's mass, dimensions and propulsion. They detect wrong units.
 //!
 //! From insects to airliners, the wing loading (N/m²) is near 47 times the cube root of the weight (N), within a factor of a
 //! few: H. Tennekes, "The Simple Science of Flight", 2nd ed., 2009.
@@ -17,7 +17,7 @@ const REYNOLDS: [f64; 2] = [1.5e4, 2e8];
 const VISCOSITY: f64 = 1.46e-5;
 /// Plausible ratios of static thrust to weight.
 const THRUST: [f64; 2] = [0.03, 4.0];
-/// Plausible ratios of the pitch speed to the airspeed of level flight at a lift coefficient of 0.6.
+/// Plausible ratios of the propeller's pitch speed to the airspeed of level flight at a lift coefficient of 0.6.
 const PITCH_SPEED: [f64; 2] = [1.0, 12.0];
 /// Plausible products of static thrust and pitch speed per mass, W/kg.
 const POWER: [f64; 2] = [5.0, 5000.0];
@@ -58,7 +58,7 @@ impl Size {
         (2.0 * self.weight() / (SEA_LEVEL_DENSITY * self.area * 0.6)).sqrt()
     }
 
-    /// Reason why the measures are implausible, with the value that was probably meant. `None` if they are plausible.
+    /// Reason why mass, span and area are implausible, with the value that was probably meant. `None` if they are plausible.
     pub fn doubt(self) -> Option<String> {
         let what = self.odd()?;
         let value = |place: usize, size: Size| [size.mass, size.span, size.area][place];
@@ -80,7 +80,7 @@ impl Size {
         Some(format!("{what}: {}", meant.unwrap_or_else(check)))
     }
 
-    /// Implausible property of these measures, in words. `None` if there is none.
+    /// The property that is implausible for this mass, span and area, in words. `None` if there is none.
     fn odd(self) -> Option<String> {
         let aspect = self.span * self.span / self.area;
         let loading = self.weight() / self.area / (LINE * self.weight().cbrt());

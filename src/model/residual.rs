@@ -145,9 +145,9 @@ pub fn hash(bytes: &[u8]) -> String {
 }
 
 impl Scales {
-    /// Scales of an aircraft. Airspeed is relative to V0 in units of V0/4, rates are in units of their fraction of x_c in brisk
-    /// flight, angles in units of 0.2 rad (about the stall), deflections in units of the largest travel. Throttle is
-    /// relative to 0.5 in units of 0.5.
+    /// Scales of an aircraft. Airspeed is relative to V0, in units of V0/4. The rates p, q and r are in units of 0.1, 0.02 and
+    /// 0.05 times their x_c, which are typical of brisk flight. Angles are in units of 0.2 rad (about the stall), deflections in
+    /// units of the largest travel. Throttle is relative to 0.5, in units of 0.5.
     pub fn new(airframe: &Airframe, x_c: [f64; OUTPUTS]) -> Scales {
         let [_, _, v0, p, q, r, _, _] = x_c;
         let unit = [0.25 * v0, 0.1 * p, 0.02 * q, 0.05 * r, 0.2, 0.2];
@@ -166,7 +166,7 @@ impl Scales {
     pub fn inputs<R: Real>(&self, state: &State<R>, controls: &Controls<R>) -> [R; INPUTS] {
         let State { airspeed, p, q, r, alpha, beta, .. } = *state;
         let Controls { aileron, elevator, throttle, .. } = *controls;
-        // a plain loop here and in kernels, because a closure that is not inlined leaves the vector instructions
+        // a plain loop, because a closure that is not inlined would leave the caller's vector instructions
         let mut x = [airspeed, p, q, r, alpha, beta, aileron, elevator, throttle];
         for (i, x) in x.iter_mut().enumerate() {
             *x = (*x - R::from_f64(self.offset[i])).scale(self.factor[i]);
@@ -215,8 +215,8 @@ impl Residual {
         self
     }
 
-    /// Distance of a point from the training data. Within 1 lie 99.9 % of the training samples. Zero if the file has no
-    /// envelope.
+    /// Distance of a point from the training data. It is at most 1 for 99.9 % of the training samples. Zero if the residual has
+    /// no envelope.
     pub fn distance(&self, state: &State, controls: &Controls) -> f64 {
         let inputs = self.scales.inputs(state, controls);
         self.envelope.as_ref().map_or(0.0, |e| e.distance(&self.network, &inputs))
@@ -273,7 +273,7 @@ impl Residual {
     }
 }
 
-/// The origin in the metadata of a file.
+/// The origin of a residual from the metadata of its file.
 fn origin(bytes: &[u8]) -> Result<Origin, String> {
     let origin: Origin = weights::origin(bytes)?;
     match origin.schema.as_str() {

@@ -1,8 +1,8 @@
-//! Textbook model of an aircraft from a few of its measures, with realistic standard deviations.
+//! Textbook model of an aircraft from its mass, dimensions and thrust, with realistic standard deviations.
 //!
 //! Sources are B. Etkin, L. D. Reid, "Dynamics of Flight", 3rd ed., 1996; J. Roskam, "Airplane Design" part V, 1985 (radii
-//! of gyration); \[BM12\]. The ratios for roll are those of the published X8 and Aerosonde, those for the elevons of a
-//! flying wing are the X8's.
+//! of gyration); \[BM12\]. The factors for roll are taken from the published X8 and Aerosonde, the factors for the elevons
+//! of a flying wing from the X8.
 
 mod derivatives;
 
@@ -21,7 +21,7 @@ pub enum Tail {
     FlyingWing,
 }
 
-/// Measures of an aircraft, from which a model is estimated.
+/// Mass, dimensions and thrust of an aircraft, from which a model is estimated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measures {
     /// Name of the aircraft.
@@ -70,7 +70,7 @@ impl Drives {
 /// An estimated number: name, value (in the unit of its name), relative standard deviation, source.
 pub type Estimate = (&'static str, f64, f64, &'static str);
 
-/// An effect of a model file, as its id, with the estimates of its coefficients.
+/// The id of an effect in a model file, with the estimates of the effect's coefficients.
 pub(crate) type Section = (&'static str, Vec<Estimate>);
 
 /// Largest lift coefficient of a small wing.
@@ -246,14 +246,15 @@ impl Measures {
         if self.rudder.is_some() {
             effects.push(("rudder_linear", rudder()));
         }
-        // measured errors of these formulas replace the stated standard deviations, where there are measured ones
+        // where the errors of these formulas were measured, they replace the stated standard deviations
         for (name, _, width, _) in effects.iter_mut().flat_map(|(_, all)| all.iter_mut()) {
             *width = widths::of(Tool::Textbook, name).unwrap_or(*width);
         }
         effects
     }
 
-    /// Moments of inertia, kg m². The radii of gyration are relative to half the span, half the length and half their mean.
+    /// Moments of inertia, kg m². The radii of gyration about x, y and z are fractions of half the span, half the length and
+    /// half the mean of both.
     pub(crate) fn inertia(&self) -> [Estimate; 4] {
         let length =
             if self.tail == Tail::Conventional { 0.7 * self.span } else { 0.35 * self.span };
@@ -284,7 +285,7 @@ pub fn numbers(out: &mut String, estimates: &[Estimate]) {
         let number = if tiny { format!("{value:.4e}") } else { format!("{value:.5}") };
         let _ = write!(out, "{name} = {{ value = {number}, source = \"{source}\"");
         let sd = width * value.abs();
-        // a value that is written as zero is fixed in a fit
+        // a value that rounds to zero gets no standard deviation, so that a fit keeps it fixed
         if sd > 0.0 && (tiny || value.abs() >= 5e-6) {
             let _ = write!(out, ", sd = {sd:.3e}");
         }

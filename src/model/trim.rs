@@ -66,16 +66,16 @@ impl Trim {
             .ok_or_else(|| failure(model, 0.0, 0.0, airspeed))
     }
 
-    /// Straight flight with level wings at `airspeed` (m/s) and `altitude` (m). It is level if a throttle within 0..1 holds
-    /// level flight. Otherwise it is the descent at full throttle if it is shallower than the glide at idle, or else the
-    /// glide. If neither has a trim, the result is that of `Trim::level`.
+    /// Straight flight with level wings at `airspeed` (m/s) and `altitude` (m). The flight is level if a throttle within 0..1
+    /// holds level flight. Otherwise it is a descent: at full throttle if this is shallower than the glide at idle, else at
+    /// idle. If no descent has a trim, the result is that of `Trim::level`.
     ///
     /// # Errors
     /// If neither level flight nor a descent has a trim.
     pub fn straight(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Trim, TrimError> {
         match Trim::level(model, airspeed, altitude) {
             Ok(level) if (0.0..=1.0).contains(&level.controls.throttle) => Ok(level),
-            // a propeller that brakes at low throttle has a second, negative solution
+            // with a propeller that brakes at low throttle, the level trim may have a negative throttle
             level => descent(model, airspeed, altitude).map_or(level, Ok),
         }
     }
@@ -120,8 +120,8 @@ impl Trim {
 }
 
 /// The trim found from the initial throttle `start`. If its throttle is outside 0..1, the search is repeated from full
-/// throttle. The second trim is used if its throttle is within 0..1. A thrust that falls before it rises with throttle, as for
-/// a windmilling propeller, has two trims.
+/// throttle, and the second trim is used if its throttle is within 0..1. Two trims exist if the thrust first falls and then
+/// rises with throttle, as for a windmilling propeller.
 fn within_stops(from: impl Fn(f64) -> Option<Trim>, start: f64) -> Option<Trim> {
     let holds = |trim: &Trim| (0.0..=1.0).contains(&trim.controls.throttle);
     let first = from(start);
@@ -176,7 +176,7 @@ fn straight_at(model: &GreyBox, airspeed: f64, altitude: f64, throttle: f64) -> 
 /// Treatment of the throttle in the trim of an attitude.
 #[derive(Clone, Copy)]
 enum Thrust {
-    /// The throttle is an unknown that holds the airspeed. Its initial value is given.
+    /// The throttle is an unknown that holds the airspeed. The value is its initial guess.
     From(f64),
     /// The throttle is fixed at this value.
     Held(f64),

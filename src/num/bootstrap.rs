@@ -14,8 +14,8 @@ pub fn interval(samples: &[f64], seed: u64, statistic: impl Fn(&[f64]) -> f64) -
     stratified_interval(std::slice::from_ref(&samples), seed, statistic)
 }
 
-/// The same interval for the samples of all `strata` in order. Each stratum is resampled separately and keeps its size
-/// (rliable, Agarwal et al. 2021).
+/// The same interval for samples in `strata`. Each stratum is resampled separately and keeps its size (rliable, Agarwal et al.
+/// 2021). `statistic` gets the resampled strata as one list, in order.
 pub fn stratified_interval<S: AsRef<[f64]>>(
     strata: &[S],
     seed: u64,
@@ -58,7 +58,8 @@ mod tests {
                 low <= 0.0 && 0.0 <= high
             })
             .count();
-        // nominal 95 %, reduced by 1–2 % by the bootstrap at 50 samples, with a binomial standard deviation of 1.5 %
+        // The nominal coverage is 95 %. With 50 samples the bootstrap covers 1–2 % less. The binomial standard deviation of
+        // the counted coverage is 1.5 %.
         assert!((178..=199).contains(&covered), "{covered} of 200");
         let all = interval(&[2.0; 7], 1, mean);
         assert_eq!(all, [2.0, 2.0]);

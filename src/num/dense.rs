@@ -46,7 +46,7 @@ impl<R: Copy> Units<R> {
     }
 }
 
-/// Iterator over a network's layers. It is a named type because it must be inlined into kernels.
+/// Iterator over a network's layers. The named type allows `#[inline(always)]`, which kernels need.
 #[derive(Clone, Debug)]
 pub struct Layers<'a> {
     sizes: &'a [usize],
@@ -202,7 +202,8 @@ impl Dense {
         answer
     }
 
-    /// Writes the last hidden layer to `units` and returns its number of units. Zero for a network with a single layer.
+    /// Writes the outputs of the last hidden layer to `units` and returns their number. A network without a hidden layer
+    /// returns zero.
     ///
     /// # Panics
     /// If the length of `input` differs from the network's inputs, or a layer is wider than [`ON_STACK`].
@@ -241,8 +242,8 @@ impl Dense {
         &from[..self.sizes[last + 1]]
     }
 
-    /// Output for one input in single precision, vectorised over the outputs of a layer. It serves networks that are evaluated
-    /// once per tick. Units at zero are skipped.
+    /// Output for one input in single precision, vectorised over the outputs of a layer. The function suits networks that are
+    /// evaluated once per tick. It skips units whose value is zero.
     ///
     /// # Panics
     /// If the length of `input` differs from the network's inputs.

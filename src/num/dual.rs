@@ -135,7 +135,7 @@ impl<const N: usize, T: Real> Real for Dual<N, T> {
         }
         Dual { value: T::where_less(a.value, b.value, then.value, otherwise.value), gradient }
     }
-    // a constant has no derivative that would have to be multiplied
+    // the gradient of a constant is zero, which saves half of the products
     #[inline(always)]
     fn scale(self, factor: f64) -> Self {
         Dual { value: self.value.scale(factor), gradient: each(self.gradient, |g| g.scale(factor)) }

@@ -3,8 +3,7 @@
 use super::Real;
 use super::table::TableError;
 
-/// Largest number of points along the second variable. The limit exists because their ramps are held in registers or on the
-/// stack.
+/// Largest number of points along the second variable. The ramps between all these points are held in registers or on the stack.
 const MOST_COLUMNS: usize = 16;
 /// Largest number of points along the first variable.
 const MOST_ROWS: usize = 100;
@@ -16,7 +15,7 @@ pub struct Grid {
     y: Vec<f64>,
     /// The function along `y` at the first `x`: the value at the first `y`, then a slope for each interval of `y`.
     first: Vec<f64>,
-    /// The slope over `x` in each interval of `x`, in the same form along `y`.
+    /// For each interval of `x`: the slope over `x` as a function of `y`, stored like `first`.
     slopes: Vec<Vec<f64>>,
 }
 
@@ -58,7 +57,7 @@ fn increasing(points: &[f64], most: usize) -> Result<(), TableError> {
     }
 }
 
-/// Value at the first point, then the slope of each interval.
+/// Returns the value at the first point of `y`, then the slope of each interval of `y`. The value at `y[j]` is `values(j)`.
 fn along(y: &[f64], values: impl Fn(usize) -> f64) -> Vec<f64> {
     let slope = |j: usize| (values(j) - values(j - 1)) / (y[j] - y[j - 1]);
     std::iter::once(values(0)).chain((1..y.len()).map(slope)).collect()

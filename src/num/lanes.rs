@@ -11,12 +11,12 @@ use std::arch::x86_64::{__m128, __m256, __m512};
 
 /// `N` lanes in a register `V`, one for each candidate of a batch.
 ///
-/// With an array (`V = [f32; N]`) the compiler vectorises the operations, which is slow for AVX-512. With the registers of an
-/// instruction set, each operation is an intrinsic.
+/// With an array (`V = [f32; N]`) the compiler vectorises the operations. The result is slow for AVX-512. With the registers of
+/// an instruction set, each operation is an intrinsic.
 ///
-/// With `FUSED`, [`Real::mul_add`] rounds only once, which changes the last bits of results. It doubles the speed if the
-/// processor has the instruction and the kernel is compiled for it. Otherwise it is very slow. Without `FUSED`, all kinds
-/// of lanes give bit-identical results.
+/// With `FUSED`, [`Real::mul_add`] rounds only once, which changes the last bits of results. `FUSED` doubles the speed if
+/// the processor has the instruction and the kernel is compiled for it. Otherwise it is very slow. Without `FUSED`, all
+/// kinds of lanes give bit-identical results.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(64))]
 pub struct Lanes<const N: usize, const FUSED: bool = false, V = [f32; N]>(pub V);
@@ -140,7 +140,7 @@ impl<const N: usize, const FUSED: bool, V: Register> Lanes<N, FUSED, V> {
     }
 }
 
-/// Lanes that can be accessed in rows of [`ROW`].
+/// Lanes that can be accessed in rows of [`ROW`] lanes.
 pub trait Packed: Real {
     /// Number of rows in the lanes.
     const ROWS: usize;
@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn functions_agree_with_the_standard_library() {
-        // 1e-6 is eight units in the last place at one, three times the documented error of the routines
+        // the tolerance of 1e-6 is eight units in the last place of numbers near one; the documented errors are at most three
         for i in -40_000..=40_000_i32 {
             let x = i as f32 * 2.5e-4;
             let ([s], [c]) = sin_cos([x]);

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Least-squares solution of `rows` · x = `values`. If it is not unique, the solution of minimum norm. `None` if an
-/// input is not finite, or if there are no rows.
+/// Least-squares solution x of `rows` · x = `values`. If there are several solutions, the function returns the one of
+/// minimum norm. It returns `None` if an input is not finite or if there are no rows.
 pub fn least_squares<const N: usize>(rows: &[[f64; N]], values: &[f64]) -> Option<[f64; N]> {
     if rows.is_empty() || !rows.iter().flatten().chain(values).all(|x| x.is_finite()) {
         return None;

@@ -1,4 +1,5 @@
-//! Numerics: the generic scalar of the equations, its implementations, and seeded random streams.
+//! Numerics: the generic scalar of the equations with its implementations, networks, tables, statistics and seeded random
+//! streams.
 
 pub mod bootstrap;
 pub mod dense;

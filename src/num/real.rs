@@ -54,7 +54,7 @@ pub trait Real:
     fn max(self, other: Self) -> Self {
         Self::where_less(self, other, other, self)
     }
-    /// Multiply-add `self · factor + addend`, with one or two roundings that depend on the type.
+    /// Multiply-add `self · factor + addend`. The type determines whether the result is rounded once or twice.
     #[inline(always)]
     fn mul_add(self, factor: Self, addend: Self) -> Self {
         self * factor + addend
@@ -83,7 +83,7 @@ pub trait Real:
     #[inline(always)]
     fn tanh(self) -> Self {
         let one = Self::from_f64(1.0);
-        // beyond ±20 the tangent is ±1 in double precision too, and the limit keeps the exponential finite
+        // beyond ±20 the hyperbolic tangent is ±1 even in double precision; the limit keeps the exponential finite
         let e = self.clamp(-20.0, 20.0).scale(2.0).exp();
         (e - one) / (e + one)
     }
@@ -95,8 +95,8 @@ pub trait Real:
     }
 }
 
-/// Applies `f` to every element. The function is always inlined, unlike the `map` of an array, because a call would leave the
-/// vector instructions of the caller.
+/// Applies `f` to every element. The function is always inlined, unlike the `map` of an array. A call would be compiled without
+/// the caller's vector instructions.
 #[inline(always)]
 pub fn each<const N: usize, T: Copy, S: Copy>(all: [T; N], mut f: impl FnMut(T) -> S) -> [S; N] {
     let mut out = [f(all[0]); N];

@@ -2,8 +2,8 @@
 
 use std::fmt::Debug;
 
-/// The constant 1.5 · 2²³. Its addition and subtraction round a number to the nearest integer without a call. The last bits
-/// of the sum are those of the integer.
+/// The constant 1.5 · 2²³. Adding it to a number and then subtracting it rounds the number to the nearest integer without a
+/// call. The last bits of the sum are those of the integer.
 pub(super) const ROUND: f32 = 12_582_912.0;
 
 /// Single-precision numbers that one instruction processes together. Each operation rounds once as in IEEE 754. All kinds
@@ -13,8 +13,8 @@ pub(super) const ROUND: f32 = 12_582_912.0;
 pub trait Register: Copy + Debug + Send + Sync + 'static {
     /// Number of lanes.
     const LANES: usize;
-    /// Number of sums that are computed at the same time. They hide the latency of a multiply-add and leave registers for its
-    /// operands.
+    /// Number of sums that are computed at the same time. It is large enough to hide the latency of a multiply-add and small
+    /// enough to leave registers for the operands.
     const SUMS: usize;
     /// The same number in every lane.
     fn splat(x: f32) -> Self;
@@ -44,7 +44,8 @@ pub trait Register: Copy + Debug + Send + Sync + 'static {
     fn greater(self, other: Self) -> Self;
     /// Selection in each lane: `a < b ? then : otherwise`.
     fn where_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self;
-    /// Sine and cosine of an angle plus n quarter turns. The addition of 1.5 · 2²³ has rounded n into `shifted`.
+    /// Sine and cosine of an angle plus n quarter turns. `sine` and `cosine` are those of the angle. `shifted` is n + 1.5 · 2²³,
+    /// whose last bits are those of n.
     fn quarters(shifted: Self, sine: Self, cosine: Self) -> (Self, Self);
     /// The power 2ⁿ of an integer n in −126..=127.
     fn power(n: Self) -> Self;
@@ -52,8 +53,8 @@ pub trait Register: Copy + Debug + Send + Sync + 'static {
     fn sum(self) -> f32;
 }
 
-/// The values of an expression for `i` from 0 to `N` − 1. It is a loop because `std::array::from_fn` might not be inlined and
-/// then leaves the vector instructions of its caller.
+/// The values of an expression for `i` from 0 to `N` − 1. The macro is a loop because `std::array::from_fn` might not be inlined
+/// and would then be compiled without its caller's vector instructions.
 macro_rules! entries {
     ($i:ident => $value:expr) => {{
         let mut all = [0.0; N];
@@ -163,7 +164,7 @@ impl<const N: usize> Register for [f32; N] {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pair<V>(V, V);
 
-/// Implements operations on each half separately.
+/// Implements each operation separately for the two halves.
 macro_rules! halves {
     ($($method:ident($($other:ident),*)),*) => {$(
         #[inline(always)]

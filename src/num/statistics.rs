@@ -12,7 +12,7 @@ pub fn quantile(samples: &[f64], q: f64) -> f64 {
     }
     let place = q.clamp(0.0, 1.0) * (samples.len() - 1) as f64;
     let (low, part) = (place.floor() as usize, place.fract());
-    // Two order statistics need no sorting of the others.
+    // only two order statistics are needed, which takes less time than sorting all samples
     let mut parted = samples.to_vec();
     let (_, below, rest) = parted.select_nth_unstable_by(low, f64::total_cmp);
     let (below, above) = (*below, rest.iter().copied().min_by(f64::total_cmp));
@@ -28,9 +28,9 @@ pub fn interquartile_mean(samples: &[f64]) -> f64 {
     mean(&sorted[cut..sorted.len() - cut])
 }
 
-/// Integral correlation length of the series in `parts`, in samples. It is 1 for white noise. The series have zero mean (the
-/// mean is not removed) and gaps between them. The length is the sum of the autocorrelation over positive and negative
-/// lags, up to the lag at which it first falls to 0.05.
+/// Integral correlation length, in samples, of a series with gaps between its `parts`. The length is the sum of the
+/// autocorrelation over positive and negative lags, up to the lag at which the autocorrelation first falls to 0.05. White
+/// noise has the length 1. The series must have zero mean, because its mean is not removed.
 pub fn correlation_length(parts: &[Vec<f64>]) -> f64 {
     let mean_product = |lag: usize| {
         let pairs = parts.iter().flat_map(|part| part.iter().zip(part.iter().skip(lag)));

@@ -6,7 +6,7 @@ use super::Real;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     floor: f64,
-    /// Segments, each as x at its start, length in x, and slope.
+    /// Segments between neighbouring points, each with its start in x, its length in x and its slope.
     segments: Vec<(f64, f64, f64)>,
 }
 

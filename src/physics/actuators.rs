@@ -1,12 +1,12 @@
-//! Actuators: filters from commands to the deflections that act on the airframe, exact at a time step of 0.01 s.
+//! Actuators: discrete filters that turn commands into the deflections that act on the airframe.
 //!
-//! JSBSim discretises each filter with the bilinear (Tustin) rule at the simulation step. A recurrence with the same
-//! coefficients therefore reproduces its filters to rounding.
+//! The time step is 0.01 s. JSBSim discretises each filter with the bilinear (Tustin) rule at its simulation step. The
+//! recurrences here have the same coefficients and reproduce JSBSim's filters up to rounding.
 
 use crate::servos::{ActuatorFigures, Surface};
 use greylag_num::{Real, each};
 
-/// A command. It is the action of eq. (29) of \[GSFM26\] with throttle = (a_thr + 1)/2.
+/// A command to the actuators: the action of eq. (29) of \[GSFM26\], with throttle = (a_thr + 1)/2.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Command<R = f64> {
     /// Aileron, −1..1; positive rolls right.
@@ -39,7 +39,7 @@ impl Command {
     }
 }
 
-/// Largest total number of `lag(…)` and `delay(…)` terms of effect files in the formulas of one model.
+/// Largest number of `lag(…)` and `delay(…)` terms, counted together, in all effect files of one model.
 pub const LAGS: usize = 2;
 
 /// Deflections and throttle position that act on the airframe at one instant.
@@ -53,8 +53,8 @@ pub struct Controls<R = f64> {
     pub throttle: R,
     /// Rudder deflection δr, rad; positive trailing edge left. Zero on an aircraft without a rudder.
     pub rudder: R,
-    /// Values of the lags and delays of the model's formulas at this instant. `None` if the past controls are unknown. The
-    /// lags and delays then count as settled.
+    /// Values of the model's `lag(…)` and `delay(…)` terms at this instant. `None` if the past controls are unknown: each
+    /// term then takes its steady-state value, the present value of its argument.
     pub lagged: Option<[R; LAGS]>,
 }
 
@@ -80,7 +80,7 @@ impl<R: Copy> Controls<R> {
 }
 
 impl Controls {
-    /// Linear interpolation to `next`, at the fraction `part` of the way.
+    /// Interpolates linearly between `self` (`part` = 0) and `next` (`part` = 1).
     pub fn towards(&self, next: &Controls, part: f64) -> Controls {
         let mix = |a: f64, b: f64| a + part * (b - a);
         Controls {
@@ -116,7 +116,7 @@ pub struct ActuatorState<R = f64> {
 }
 
 impl<R: Copy> ActuatorState<R> {
-    /// The positions as controls, with unknown lags and delays.
+    /// The positions as `Controls`, whose `lagged` is `None`.
     #[inline(always)]
     pub fn controls(&self) -> Controls<R> {
         Controls {
@@ -129,7 +129,7 @@ impl<R: Copy> ActuatorState<R> {
     }
 }
 
-/// A second-order filter of a surface, with its memory. Travel and rate limits follow the filter.
+/// The second-order filter of a surface, with its memory. The travel and rate limits apply to the filter's output.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceFilter<R = f64> {
     /// The last two commanded deflections, rad, newest first.
@@ -157,7 +157,8 @@ impl<R: Real> SurfaceFilter<R> {
         SurfaceFilter { input: [position; 2], output: [position; 2], clipped: [position; 2] }
     }
 
-    /// The filter memory consistent with a `position` (rad) and `rate` (rad/s) after the last two commands.
+    /// The filter memory that gives the observed `position` (rad) and `rate` (rad/s) after the last two commands, `old` and
+    /// then `new`.
     #[inline(always)]
     fn observed(
         [position, rate]: [R; 2],
@@ -210,7 +211,8 @@ impl<R: Real> SurfaceFilter<R> {
 }
 
 impl<R: Real> Actuators<R> {
-    /// Actuators at rest at `controls`, with commands that hold them there. Without rudder data the rudder keeps its position.
+    /// Actuators at rest at `controls`, under commands that hold them there. The rudder keeps its position in
+    /// `step` if the figures describe no rudder.
     pub fn at_rest(controls: &Controls<R>) -> Self {
         Actuators {
             aileron: SurfaceFilter::at(controls.aileron),
@@ -221,15 +223,15 @@ impl<R: Real> Actuators<R> {
         }
     }
 
-    /// The actuators without the rudder's filter if `figures` have no rudder.
+    /// Removes the rudder's filter if `figures` describe no rudder.
     pub fn fitted(self, figures: &ActuatorFigures) -> Self {
         Actuators { rudder: figures.rudder.and(self.rudder), ..self }
     }
 
     /// The filter memories consistent with an observed `state` after the commands `previous` (newest first).
     ///
-    /// The memories are exact unless a surface is at a travel limit or moves at its rate limit, where the output of the filter
-    /// is not observed. The first step after the limit may then be wrong by up to 8 % of the travel.
+    /// The memories are exact unless a surface is at a travel limit or moves at its rate limit. At a limit the output of the
+    /// filter is not observed, and the first step after the limit may be wrong by up to 8 % of the travel.
     #[inline(always)]
     pub fn from_observed(
         state: &ActuatorState<R>,
@@ -264,7 +266,7 @@ impl<R: Real> Actuators<R> {
         }
     }
 
-    /// Selects the filters of `then` where `chosen` is above zero, else those of `self`.
+    /// Selects the filters of `then` in the SIMD lanes in which `chosen` is above zero, and those of `self` in the others.
     #[inline(always)]
     pub fn replaced(&self, chosen: R, then: &Self) -> Self {
         let one = |old: R, new: R| R::where_less(R::zero(), chosen, new, old);
@@ -293,7 +295,7 @@ impl<R: Real> Actuators<R> {
         self.throttle_input = command.throttle;
     }
 
-    /// Present deflections and throttle position, with unknown lags and delays.
+    /// Present deflections and throttle position. `lagged` is `None`.
     #[inline(always)]
     pub fn controls(&self) -> Controls<R> {
         Controls {
@@ -308,7 +310,7 @@ impl<R: Real> Actuators<R> {
         }
     }
 
-    /// Present observation. The rates are differences over the last step.
+    /// The present actuator state. Its rates are differences over the last step.
     #[inline(always)]
     pub fn observed(&self, figures: &ActuatorFigures) -> ActuatorState<R> {
         let (rudder, rudder_rate) = match &self.rudder {
@@ -339,7 +341,7 @@ mod tests {
     #[test]
     fn recurrences_are_those_measured_in_the_simulator() {
         let f = figures();
-        // the printed values have five decimals
+        // the simulator's surface coefficients are known to five decimals
         for (ours, printed) in [
             (f.aileron.filter[0], 0.12774),
             (-f.aileron.filter[1], 0.76644),

@@ -56,18 +56,18 @@ pub struct Envelope {
     pub surface_slew_per_s: f64,
 }
 
-/// Ratio of the smallest load factor to the largest if a file states no smallest: FAR 23.337 (b) (1), normal and utility
-/// category.
+/// Ratio of the smallest to the largest load factor if a file states only the largest: FAR 23.337 (b) (1), normal and
+/// utility category.
 const LEAST_LOAD: f64 = -0.4;
 /// Largest sideslip if a file states none, degrees. Linear lateral derivatives are not valid beyond it.
 const SIDESLIP_DEG: f64 = 25.0;
-/// Ratio of the stall angle to the angle from which the nose is pushed down, if a file states none.
+/// Ratio of the stall angle to the angle from which the nose is pushed down, if a file states no stall angle.
 const STALL: f64 = 4.0 / 3.0;
-/// Fraction of the stall angle that limits the angle of attack in flight.
+/// Largest angle of attack in flight, as a fraction of the stall angle.
 const BEFORE_STALL: f64 = 0.95;
 
 impl Envelope {
-    /// Smallest normal load factor: the file's, or −0.4 of the largest if the file states none (FAR 23.337).
+    /// Smallest normal load factor: the file's, or −0.4 times the largest if the file states none (FAR 23.337).
     pub fn load_factor_least(&self) -> f64 {
         self.load_factor_min.unwrap_or(LEAST_LOAD * self.load_factor_max)
     }
@@ -84,7 +84,7 @@ impl Envelope {
     }
 }
 
-/// Reference condition for scaling an aircraft's quantities.
+/// Reference flight condition of an aircraft.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reference {
     /// Reference airspeed V0 of x_c, eq. (21) of \[GSFM26\], m/s.
@@ -94,7 +94,7 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// Reference condition of files of schema 1: the start of an episode in section V-A of \[GSFM26\].
+    /// Reference condition for files of schema 1, which state none: the start of an episode in section V-A of \[GSFM26\].
     pub const OF_SCHEMA_1: Reference = Reference { airspeed: 16.67, altitude: 600.0 };
 }
 
@@ -105,7 +105,7 @@ pub struct Incidence {
     /// Largest angle of attack of steady flight, rad.
     #[serde(rename = "comfortable_rad")]
     pub comfortable: f64,
-    /// Largest angle of attack that a commanded attitude may require, rad. Larger ones occur only in transients.
+    /// Largest angle of attack that a commanded attitude may require, rad. Larger angles occur only in transients.
     #[serde(rename = "tolerable_rad")]
     pub tolerable: f64,
     /// Angle of attack above which the controller pushes the nose down, rad.
@@ -128,8 +128,8 @@ impl Incidence {
         stall: None,
     };
 
-    /// Largest angle of attack in a transient, rad: 95 % of the stall angle. If the file states no stall angle, it is 4/3 of
-    /// `push_from`.
+    /// Largest angle of attack in a transient, rad: 95 % of the stall angle. If the file states no stall angle, 4/3 of
+    /// `push_from` is taken.
     pub fn before_stall(&self) -> f64 {
         BEFORE_STALL * self.stall.unwrap_or(STALL * self.push_from)
     }
@@ -170,7 +170,7 @@ pub struct Airframe {
     pub mixer: Option<Mixer>,
     /// JSBSim properties that are constant in flight, for example flaps.
     pub conditions: BTreeMap<String, f64>,
-    /// Reference condition for scaling.
+    /// Reference condition for x_c, design and simulation.
     pub reference: Reference,
     /// Limits of the angle of attack for controllers.
     pub incidence: Incidence,
@@ -184,7 +184,7 @@ pub struct Airframe {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a number with its source: { value = …, source = \"…\" }")]
 pub struct Sourced {
-    /// Value in the unit that ends the field's name.
+    /// Value, in the unit given by the suffix of the field's name.
     pub value: f64,
     /// Source of the value, in words.
     pub source: String,
@@ -419,12 +419,14 @@ pub fn check_schema(schema: u32, newest: u32) -> Result<(), String> {
     ))
 }
 
-/// Checks that a number is positive and at most `most`, the largest value of any aircraft.
+/// Returns the value of `number` if it is positive and at most `most`, the largest value of any aircraft. The error names
+/// `field`.
 pub fn positive(field: &str, number: &Sourced, most: f64) -> Result<f64, String> {
     within(field, number, [most * 1e-9, most])
 }
 
-/// Checks that a number lies between `least` and `most`, which are positive, and that its standard deviation is positive.
+/// Returns the value of `number` if it lies between the positive bounds `least` and `most` and its standard deviation, if
+/// stated, is positive. The error names `field`.
 pub fn within(field: &str, number: &Sourced, [least, most]: [f64; 2]) -> Result<f64, String> {
     if number.sd.is_some_and(|sd| !(sd.is_finite() && sd > 0.0)) {
         return Err(format!("{field}.sd must be a positive number"));

@@ -1,4 +1,4 @@
-//! Air density and gravity, constant or of the standard atmosphere.
+//! Air density, either constant or of the standard atmosphere, and constant gravity.
 
 /// Sea-level density of the standard atmosphere (ISO 2533), the reference of equivalent airspeed, kg/m³.
 pub const SEA_LEVEL_DENSITY: f64 = 1.225;
@@ -13,7 +13,7 @@ pub const MIDDLE_GRAVITY: f64 = 9.806;
 pub enum Density {
     /// Constant density, kg/m³.
     Constant(f64),
-    /// The density of the troposphere of the standard atmosphere (ISO 2533) at the altitude.
+    /// Density of the standard atmosphere (ISO 2533) in the troposphere, a function of altitude.
     Standard,
 }
 

@@ -2,17 +2,17 @@
 //!
 //! Model, planner and logs have four controls: aileron, elevator, rudder, throttle. An aircraft may have other surfaces: two
 //! elevons, a V-tail, several motors. Effector i receives the command u_i = Σ_j g_ij c_j, where c_j are the commands of the
-//! controls. A surface moves to its deflection at u_i, limited to −1..1. The inverse is c = g⁺ u by least squares, where u_i
-//! is the deflection divided by half the travel. Forces that are linear in the surfaces' deflections are therefore linear
-//! in the deflections of the controls.
+//! controls. A surface moves to the deflection that belongs to u_i, which is limited to −1..1. The inverse mapping is
+//! c = g⁺ u by least squares, where u_i is the deflection divided by half the travel. This mapping is linear, so forces that
+//! are linear in the surfaces' deflections are also linear in the deflections of the controls.
 
 use crate::Command;
 use crate::servos::{Travel, Travels};
 
 /// Names of the controls, in the order of an effector's gains.
 pub const CONTROLS: [&str; 4] = ["aileron", "elevator", "rudder", "throttle"];
-/// Relative tolerance for linear dependence. A column of gains is dependent if its part orthogonal to the preceding columns
-/// is shorter than this fraction of its length.
+/// Relative tolerance for linear dependence. A control's column of gains is dependent if its part orthogonal to the preceding
+/// columns is shorter than this fraction of its length.
 const DEPENDENT: f64 = 1e-6;
 /// Relative tolerance between a control's travel in the file and the travel that its surfaces give.
 const TRAVEL: f64 = 1e-3;
@@ -33,7 +33,7 @@ pub struct Effector {
     pub name: String,
     /// Kind of the effector.
     pub does: Does,
-    /// Gains: the effector's command for a command of one on each of [`CONTROLS`].
+    /// Gain from each of [`CONTROLS`]: the effector's command if this control alone has the command 1.
     pub gains: [f64; 4],
     /// Servo output of the flight controller that moves the effector, from 1. `None` if unknown.
     pub channel: Option<u8>,
@@ -128,7 +128,7 @@ pub struct Mixer {
     effectors: Vec<Effector>,
     /// Pseudo-inverse g⁺: command of each control per command of each effector, one row per effector.
     back: Vec<[f64; 4]>,
-    /// Deflection of each control at a command of one, rad: the mean over its surfaces. It is 1 for the throttle.
+    /// Deflection of each control at the command 1, rad: the mean over its surfaces. It is 1 for the throttle.
     unit: [f64; 4],
 }
 
@@ -187,7 +187,7 @@ impl Mixer {
         &self.back
     }
 
-    /// Travels of the controls (rad), with full command of one control at a time.
+    /// Travels of the controls (rad): the deflections at full command of each control alone.
     pub fn travels(&self) -> Travels {
         let travel = |j: usize| {
             let at = |value: f64| {
@@ -203,7 +203,7 @@ impl Mixer {
         Travels { aileron: travel(0), elevator: travel(1), rudder: moved.then(|| travel(2)) }
     }
 
-    /// Rejects `travels` of an airframe file that differ from the travels that the surfaces give.
+    /// Checks that the `travels` of an airframe file agree with the travels that the surfaces give.
     ///
     /// # Errors
     /// If a travel differs by more than 0.1 %. The error names the first control with such a difference.
@@ -212,7 +212,7 @@ impl Mixer {
         let pairs = [
             (Some(own.aileron), Some(travels.aileron)),
             (Some(own.elevator), Some(travels.elevator)),
-            // the travel of a rudder that only motors produce is not an angle
+            // if only motors act as the rudder, its travel is not an angle
             (own.rudder.filter(|_| self.rudder_deflects()), travels.rudder),
         ];
         for (control, (own, given)) in CONTROLS.into_iter().zip(pairs) {
@@ -236,8 +236,8 @@ impl Mixer {
     }
 }
 
-/// Deflection of control `j` at a command of one: the mean over the surfaces that it moves. If it moves only motors, the
-/// mean over the motors.
+/// Deflection of control `j` at the command 1: the mean over the surfaces that it moves (rad). If it moves only motors, the
+/// mean over these motors (0..1).
 fn unit(effectors: &[Effector], j: usize) -> f64 {
     if j == 3 {
         return 1.0;
@@ -253,7 +253,8 @@ fn unit(effectors: &[Effector], j: usize) -> f64 {
     sizes.iter().sum::<f64>() / sizes.len().max(1) as f64
 }
 
-/// g⁺ by modified Gram–Schmidt: g = Q R, g⁺ = R⁻¹ Qᵀ, with one row per effector. A control without gains has zeros.
+/// The pseudo-inverse g⁺ of the gains by modified Gram–Schmidt: g = Q R, g⁺ = R⁻¹ Qᵀ. The result has one row per effector.
+/// The column of a control without gains is zero.
 fn pseudo_inverse(effectors: &[Effector]) -> Result<Vec<[f64; 4]>, MixerError> {
     let column = |j: usize| -> Vec<f64> { effectors.iter().map(|e| e.gains[j]).collect() };
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();

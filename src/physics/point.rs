@@ -53,7 +53,7 @@ impl<R: Real> AirData<R> {
     }
 }
 
-/// Input of a static effect.
+/// Inputs from which an effect computes its forces and moments.
 #[derive(Clone, Copy, Debug)]
 pub struct Point<'a, R = f64> {
     /// State of the aircraft.
@@ -66,27 +66,28 @@ pub struct Point<'a, R = f64> {
     pub geometry: &'a Geometry,
     /// Axes in which drag, side force and lift act.
     pub axes: ForceAxes,
-    /// Sums over the effects of the first pass, for the effects that depend on them. Zero during the first pass.
+    /// Results of the first pass, for the effects that depend on them. Zero during the first pass.
     pub base: &'a Base<R>,
 }
 
-/// Sums over the effects of the first pass, which depend only on state, controls and airflow.
+/// Results of the first pass over a model's effects. This pass evaluates the effects that depend only on state, controls
+/// and airflow.
 #[derive(Clone, Copy, Debug)]
 pub struct Base<R = f64> {
-    /// Forces and moments of these effects.
+    /// Sum of the forces and moments of these effects.
     pub wrench: Wrench<R>,
-    /// Force of these effects in body axes, N.
+    /// Sum of the forces of these effects in body axes, N.
     pub force: Vector<R>,
     /// The part of `wrench` due to aileron, elevator and rudder.
     pub deflected: Wrench<R>,
-    /// The part of `wrench` without deflections and body rates.
+    /// The value of `wrench` for neutral surfaces and zero body rates.
     pub still: Wrench<R>,
-    /// Rate of the model's state with all its effects, in units of the state per second.
+    /// Time derivative of the state under all effects of the model, in units of the state per second.
     pub rate: State<R>,
 }
 
 impl<R: Real> Base<R> {
-    /// The sums before the first pass: zero.
+    /// The results before the first pass: all zero.
     #[inline(always)]
     pub fn zero() -> Self {
         let wrench = Wrench::zero();

@@ -28,9 +28,10 @@ impl RigidBody {
         mass > 0.0 && jx > 0.0 && jy > 0.0 && jz > 0.0 && jx * jz > jxz * jxz
     }
 
-    /// Whether an iteration may step from this body to `next`. The body `next` must be physical and keep at least a third of
-    /// the mass and a third of 1 − Jxz²/(Jx Jz), which is zero for a singular inertia matrix. A longer step from a wrong
-    /// inertia leads to nearly infinite accelerations.
+    /// Whether an iteration may step from this body to `next`.
+    ///
+    /// The body `next` must be physical. It must keep at least a third of the mass and a third of 1 − Jxz²/(Jx Jz), which is
+    /// zero for a singular inertia matrix. A longer step may end near a singular matrix, with nearly infinite accelerations.
     pub fn may_become(&self, next: &RigidBody) -> bool {
         let room = |b: &RigidBody| 1.0 - b.jxz * b.jxz / (b.jx * b.jz);
         next.is_physical() && 3.0 * next.mass >= self.mass && 3.0 * room(next) >= room(self)
@@ -111,7 +112,7 @@ pub fn gravity_in_body<R: Real>(state: &State<R>, gravity: f64) -> Vector<R> {
     ]
 }
 
-/// Angular acceleration, rad/s² (eq. 10 with the Γ terms of \[BM12\] section 3.3).
+/// Angular acceleration in body axes, rad/s², under `moment` (N m): eq. (10) with the Γ terms of \[BM12\] section 3.3.
 #[inline(always)]
 pub fn angular_acceleration<R: Real>(
     body: &RigidBody<R>,
@@ -182,8 +183,8 @@ pub fn acceleration_of<R: Real>(state: &State<R>, air: &AirData<R>, rate: &State
     ]
 }
 
-/// Transpose of [`state_rate`] in acceleration and spin. It converts the gradient `slope` with respect to the rates to the
-/// gradients with respect to acceleration and angular acceleration (body axes).
+/// Transpose of the linear map from acceleration and spin to rates in [`state_rate`]. It converts the gradient `slope` with
+/// respect to the rates to the gradients with respect to acceleration and angular acceleration (body axes).
 #[inline(always)]
 pub fn state_rate_transposed<R: Real>(
     state: &State<R>,
@@ -202,8 +203,9 @@ pub fn state_rate_transposed<R: Real>(
     (acceleration, [slope.p, slope.q, slope.r])
 }
 
-/// Transpose of [`body_force`] and [`angular_acceleration`] in the wrench. It converts gradients with respect to acceleration
-/// and angular acceleration (body axes) to the gradient with respect to each channel.
+/// Transpose of the linear map from forces and moments to accelerations in [`body_force`] and [`angular_acceleration`]. It
+/// converts gradients with respect to acceleration and angular acceleration (body axes) to the gradient with respect to
+/// each channel.
 #[inline(always)]
 pub fn accelerations_transposed<R: Real>(
     body: &RigidBody<R>,
@@ -231,7 +233,7 @@ pub fn accelerations_transposed<R: Real>(
     wrench
 }
 
-/// Rotates a vector from body axes to the local horizon frame (north-east-down axes turned to the aircraft's heading).
+/// Rotates a vector from body axes to the local horizon frame: the NED frame rotated about the vertical to the heading.
 #[inline(always)]
 pub fn body_to_horizon<R: Real>(state: &State<R>, v: Vector<R>) -> Vector<R> {
     let (sin_roll, cos_roll) = state.roll.sin_cos();
@@ -276,7 +278,7 @@ mod tests {
     };
     const GEOMETRY: Geometry = Geometry { area: 0.75, span: 2.1, chord: 0.3571 };
 
-    /// The reference is eqs. (9), (11), (12) as printed, from the body velocities.
+    /// The reference evaluates eqs. (9), (11), (12) as printed in the paper, with the body velocities u, v, w.
     #[test]
     fn collected_rates_equal_the_printed_equations() {
         let air = AirData::new(&STATE, 1.156, 600.0, &GEOMETRY);

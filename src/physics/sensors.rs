@@ -116,7 +116,7 @@ impl TryFrom<BTreeMap<String, Written>> for Sensors {
 
     fn try_from(written: BTreeMap<String, Written>) -> Result<Self, String> {
         let mut sensors = Sensors::default();
-        // words come first, because the prior of a single constant takes precedence over a word for all of them
+        // words such as "still" come first, so that the prior stated for a single constant replaces the one of a word
         for (name, value) in &written {
             if let Written::Word(word) = value {
                 sensors.take_word(name, word)?;
@@ -178,7 +178,7 @@ impl Sensors {
                     _ => return Err(format!("sensors.{name} takes no place; {}", known_keys())),
                 }
             }
-            // a list of two numbers is parsed as a value with its standard deviation
+            // serde parses a list of two numbers as a value with its standard deviation
             Written::Known(_) if ["vanes_at_m", "accelerometer_at_m"].contains(&name) => {
                 return Err(format!("sensors.{name} is a place: [forward, right, down] in m"));
             }
@@ -204,7 +204,7 @@ impl Sensors {
         Ok(())
     }
 
-    /// These priors, replaced by those of `other` where it states them.
+    /// These priors, replaced by the priors that `other` states.
     pub fn overridden_by(&self, other: &Sensors) -> Sensors {
         let mut all = self.clone();
         all.constants.extend(other.constants.iter().map(|(name, known)| (*name, *known)));
@@ -238,12 +238,12 @@ impl Sensors {
         self.noise[of as usize]
     }
 
-    /// Position of the vanes from the centre of gravity in body axes, m. `None` if it is not stated.
+    /// Position of the vanes relative to the centre of gravity in body axes, m. `None` if it is not stated.
     pub fn vanes_at(&self) -> Option<[f64; 3]> {
         self.vanes_at
     }
 
-    /// Position of the accelerometer from the centre of gravity in body axes, m. `None` if it is not stated.
+    /// Position of the accelerometer relative to the centre of gravity in body axes, m. `None` if it is not stated.
     pub fn accelerometer_at(&self) -> Option<[f64; 3]> {
         self.accelerometer_at
     }

@@ -29,12 +29,12 @@ impl Travel {
         self.most.max(-self.least)
     }
 
-    /// The smaller magnitude of the two limits, rad, which the surface reaches on both sides.
+    /// The smaller magnitude of the two limits, rad. The surface reaches this deflection on both sides.
     pub fn smallest(&self) -> f64 {
         self.most.min(-self.least)
     }
 
-    /// Whether `deflection` (rad) lies inside the travel, without its limits.
+    /// Whether `deflection` (rad) lies strictly between the limits.
     pub fn reaches(&self, deflection: f64) -> bool {
         self.least < deflection && deflection < self.most
     }
@@ -135,7 +135,7 @@ impl ActuatorFigures {
         ActuatorFigures { aileron: surface, elevator: surface, rudder: None, throttle, step }
     }
 
-    /// The bilinear transform of 1/(τs + 1) with time constant `lag` (s) at the time step `step` (s).
+    /// Coefficients b, a of the bilinear transform of 1/(τs + 1) with time constant `lag` (s) at the time step `step` (s).
     pub fn lag(lag: f64, step: f64) -> [f64; 2] {
         let k = step / lag;
         [k / (2.0 + k), (2.0 - k) / (2.0 + k)]

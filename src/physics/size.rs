@@ -1,4 +1,4 @@
-//! Size of an aircraft, with which the physical bounds of coefficients grow.
+//! Size of an aircraft, relative to the size for which the catalogue's bounds of coefficients are stated.
 
 use super::airframe::Geometry;
 use super::effects::Coefficient;
@@ -9,7 +9,7 @@ const WRITTEN_FOR: [f64; 2] = [25.0, 5.0];
 
 /// Name of the coefficient whose bounds grow with the lift coefficient of slow flight.
 const LIFT: &str = "CL0";
-/// Load factor of a gentle pull-up in slow flight, for which the bounds of `CL0` leave room.
+/// Load factor of a gentle pull-up in slow flight. The bounds of `CL0` allow for it.
 const PULL: f64 = 1.5;
 /// Density of the standard atmosphere at sea level, kg/m³ (ISO 2533).
 const SEA_LEVEL: f64 = 1.225;
@@ -32,7 +32,7 @@ impl Size {
         Size { mass: (body.mass / mass).max(1.0), length, lift: 1.0 }
     }
 
-    /// Sets the factor for the bounds of `CL0`: `PULL` times the lift coefficient of level flight at sea level at the smallest
+    /// Sets the factor for the bounds of `CL0`: 1.5 times the lift coefficient of level flight at sea level at the smallest
     /// `airspeed` (m/s), and at least 1.
     pub fn lifted_at(self, airspeed: f64, body: &RigidBody, geometry: &Geometry) -> Size {
         let pressure = 0.5 * SEA_LEVEL * airspeed * airspeed;
@@ -85,7 +85,7 @@ mod tests {
         let large = Size::new(&body(250.0), &geometry(10.0));
         assert_eq!(large.bounds(&torque), (-1000.0, 1000.0));
         assert_eq!(large.bounds(&coefficient("k", "", "", (-1.0, 1.0))), (-1.0, 1.0));
-        // 100 N/m² at 6 m/s gives CL = 4.5 in level flight, where a CL0 of 2 must be allowed
+        // a wing loading of 100 N/m² at 6 m/s gives CL = 4.5 in level flight, so a CL0 of 2 must be allowed
         let slow = Geometry { area: 0.1, span: 1.0, chord: 0.1 };
         let lift = coefficient("CL0", "", "", (-1.0, 1.0));
         let at = |airspeed| Size::new(&body(1.0), &slow).lifted_at(airspeed, &body(1.0), &slow);

@@ -36,7 +36,7 @@ impl State {
         "beta_rad",
     ];
 
-    /// The initial state of an episode: level wings, α = β = 0, 16.67 m/s (section V-A of \[GSFM26\]).
+    /// The initial state of an episode: wings level, α = β = 0, 16.67 m/s (section V-A of \[GSFM26\]).
     pub const NEUTRAL: State = State {
         roll: 0.0,
         pitch: 0.0,
@@ -90,7 +90,7 @@ impl<R: Real> State<R> {
         }
     }
 
-    /// Selects `then` where `chosen` is above zero, else `self`, for each component.
+    /// Selects `then` in the SIMD lanes in which `chosen` is above zero, and `self` in the others.
     #[inline(always)]
     pub fn replaced(&self, chosen: R, then: &State<R>) -> Self {
         let (mut all, then) = (self.to_array(), then.to_array());

@@ -5,7 +5,7 @@ use std::time::Duration;
 /// A time on the vehicle's monotonic clock, in whole microseconds.
 ///
 /// It is a separate type because a companion has three clocks (vehicle, host, wall) whose times must not be mixed. All
-/// decisions use vehicle time.
+/// decisions of the pilot use vehicle time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Time(u64);
 

@@ -1,4 +1,5 @@
-//! A minute of random attitudes: loss of the aircraft, settled error, and integral of the error.
+//! A flight of one minute towards random attitudes. Its results are the loss of the aircraft, the settled error and the error
+//! integral.
 
 use rand::RngExt;
 use serde::Serialize;
@@ -20,13 +21,13 @@ const LEG: usize = 500;
 const SETTLED: usize = 100;
 /// Largest commanded roll and pitch, degrees, if the airframe's envelope allows them.
 const LARGEST_DEG: [f64; 2] = [40.0, 15.0];
-/// Number of the random stream.
+/// Id of the random stream of the attitudes.
 const ATTITUDES: u64 = 60;
 
 /// Largest |roll|, |pitch|, |angle of attack| and |sideslip|, rad. Beyond them an aircraft counts as lost: it is
 /// inverted or near vertical, or outside the validity of models.
 const LOST: [f64; 4] = [1.75, 1.2, 0.5, 0.7];
-/// Range of airspeed over cruise airspeed outside of which an aircraft counts as lost.
+/// Range of the ratio of airspeed to cruise airspeed. An aircraft outside this range counts as lost.
 const LOST_SPEED: [f64; 2] = [0.45, 2.5];
 
 /// Result of one minute of flight.
@@ -36,12 +37,12 @@ pub struct Minute {
     pub lost_s: Option<f64>,
     /// Mean over the attitudes of the settled error, degrees; 180 if the aircraft was lost.
     pub settled_deg: f64,
-    /// Integral of |roll error| + |pitch error| from each change of the commanded attitude, ° s.
+    /// Integral of |roll error| + |pitch error| over the flight, or up to the loss of the aircraft, ° s.
     pub integral_deg_s: f64,
 }
 
-/// The attitudes of flight `number` of `seed`: uniform within ±40° of roll and ±15° of pitch, or the envelope's where that
-/// is narrower, at the cruise airspeed.
+/// The commanded attitudes of flight `number` of `seed`, at the cruise airspeed. They are uniformly distributed within ±40°
+/// of roll and ±15° of pitch, or within the envelope where it is narrower.
 pub fn attitudes(airframe: &Airframe, seed: u64, number: u64) -> [Target; LEGS] {
     let mut rng = stream::stream(seed, &[ATTITUDES, number]);
     let envelope = &airframe.envelope;
@@ -55,8 +56,8 @@ pub fn attitudes(airframe: &Airframe, seed: u64, number: u64) -> [Target; LEGS] 
     })
 }
 
-/// Flies `controller` for a minute in `model`, towards the [`attitudes`] of flight `number` of `seed`. The aircraft
-/// becomes `changed` after [`CHANGE_S`].
+/// Flies `controller` for a minute in `model`, towards the [`attitudes`] of `flight` (seed and number). After [`CHANGE_S`]
+/// the aircraft is replaced by `changed`.
 pub fn fly(
     model: &GreyBox,
     controller: &mut dyn Controller,

@@ -85,8 +85,8 @@ impl Changed {
         &self.model
     }
 
-    /// The command that the surfaces follow when `stuck` (aileron and elevator, fractions of full deflection) was the
-    /// command at the change.
+    /// The command that the surfaces follow when the controller gives `command`. A stuck surface keeps its deflection under
+    /// `stuck`, the command at the time of the change.
     pub fn command(&self, command: Command, stuck: Command) -> Command {
         if self.change != Change::StuckSurface {
             return command;
@@ -104,7 +104,7 @@ impl Changed {
     }
 }
 
-/// Whether the same two surfaces are aileron and elevator.
+/// Whether the aircraft has elevons, which act both as ailerons and as elevator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Elevons {
     /// Two elevons.

@@ -11,14 +11,15 @@ use greylag_logs::{Flight, Sample};
 use greylag_num::stream::{self, Stream};
 use greylag_physics::{Command, State};
 
-/// Number of bins of roll and of pitch. Every cell is used once before any cell is used again.
+/// Number of bins in roll, and in pitch. Each pair of a roll bin and a pitch bin is used once before any pair is used again.
 const BINS: usize = 5;
-/// Range of the target attitudes, rad: Table II.
+/// Largest |roll| and |pitch| of the targets, rad (Table II).
 const ENVELOPE: [f64; 2] = [60.0 * DEGREE, 30.0 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
-/// Steps of 10 ms for which a random action is held. White noise at every step never leaves the trim region.
+/// Number of 10 ms steps for which a random action is held. With a new random action at every step, the aircraft would never
+/// leave the neighbourhood of trim.
 const HELD: usize = 25;
-/// Correlation from step to step of Ornstein–Uhlenbeck actions, which gives a time constant of 0.33 s.
+/// Correlation of Ornstein–Uhlenbeck actions from one step to the next. It corresponds to a time constant of 0.33 s.
 const MEMORY: f64 = 0.97;
 
 /// Ids of the random streams.
@@ -42,7 +43,7 @@ impl Place {
         stream::stream(self.seed, &[purpose, self.round.into(), self.episode.into()])
     }
 
-    /// The target attitude, with `airspeed` in m/s: stratified over 5 × 5 bins of roll and pitch.
+    /// The target of the episode, with `airspeed` in m/s. The attitudes are stratified over 5 × 5 bins of roll and pitch.
     pub fn target(&self, airspeed: f64) -> Target {
         let cycle = u64::from(self.episode) / (BINS * BINS) as u64;
         let mut bins: Vec<usize> = (0..BINS * BINS).collect();
@@ -56,14 +57,14 @@ impl Place {
         Target { roll, pitch: within(bin / BINS, ENVELOPE[1]), airspeed }
     }
 
-    /// Fraction of random actions of an episode with a controller: one half in round 0, and 0.5ⁿ in round n.
+    /// Fraction of random actions in an episode with a controller: one half in rounds 0 and 1, and 0.5ⁿ in a later round n.
     pub fn random_part(&self) -> f64 {
         0.5_f64.powi(self.round.clamp(1, 100) as i32)
     }
 }
 
-/// Random actions: held in even episodes, Ornstein–Uhlenbeck noise in odd ones. Their amplitude is drawn for each
-/// episode.
+/// Random actions. In even episodes each action is held for some time. In odd episodes the actions are Ornstein–Uhlenbeck
+/// noise. Their amplitude is drawn for each episode.
 struct Wander {
     held: bool,
     size: f64,
@@ -94,8 +95,8 @@ impl Wander {
     }
 }
 
-/// Flies an episode of [`STEPS`] steps. `controller` acts, except during random intervals with random actions. Without a
-/// controller all actions are random. The episode ends early if a state is not finite.
+/// Flies an episode of [`STEPS`] steps. In randomly chosen intervals the actions are random, in the others they are those of
+/// `controller`. Without a controller all actions are random. The episode ends early if a state is not finite.
 ///
 /// # Errors
 ///
@@ -192,7 +193,7 @@ mod tests {
         let most = |get: &dyn Fn(&Sample) -> f64| {
             flights.iter().flatten().map(|s| get(s).abs()).fold(0.0, f64::max)
         };
-        // The stall is at 12.3°. Hard targets reach 60° of bank.
+        // The aircraft stalls at 12.3°, and the hard targets have up to 60° of bank.
         assert!(most(&|s| s.alpha_rad).to_degrees() > 13.0);
         assert!(most(&|s| s.attitude_rad[0]).to_degrees() > 60.0);
         let again = fly(2);

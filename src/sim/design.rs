@@ -1,5 +1,5 @@
-//! Experiment design: finds the manoeuvre that best discriminates two effects, from simulations of models with either
-//! effect.
+//! Experiment design: finds the manoeuvre that best discriminates two effects. It simulates the manoeuvres with a model that
+//! has one of the effects and with a model that has the other.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -26,7 +26,7 @@ use greylag_sysid::weak_form::prepared::{ClockError, Prepared};
 pub const ENOUGH: f64 = 10.0;
 /// Longest accepted duration of a plan, s.
 pub const LONGEST_S: f64 = 600.0;
-/// Smallest number of repetitions: one on each of two opposite headings.
+/// Smallest number of flown manoeuvres: one on each of two opposite headings.
 const LEAST: f64 = 2.0;
 /// Step of the simulation, s.
 const STEP_S: f64 = 0.01;
@@ -57,12 +57,13 @@ pub enum DesignError {
     Cancelled(#[from] Cancelled),
 }
 
-/// One of the two effects, with its coefficients.
+/// One of the two candidate effects, with its coefficients.
 #[derive(Clone, Debug)]
 pub struct Suspect {
     /// Id of the effect.
     pub id: String,
-    /// Values of the effect's coefficients, in the effect's order. An empty list selects clearly visible values.
+    /// Values of the effect's coefficients, in the effect's order. If the list is empty, values are used with which the effect is
+    /// clearly visible in a flight.
     pub values: Vec<f64>,
 }
 
@@ -73,8 +74,8 @@ pub struct Prospect {
     pub name: &'static str,
     /// Length of the manoeuvre, s.
     pub duration_s: f64,
-    /// Separation if the first effect is true, and if the second effect is true. `None` if the aircraft with the true
-    /// effect would leave its bounds.
+    /// Separation of the effects in a flight of the aircraft with the first effect, and in a flight with the second effect.
+    /// `None` if the aircraft would leave the bounds of a schedule.
     pub separations: [Option<Separation>; 2],
 }
 
@@ -85,16 +86,18 @@ impl Prospect {
         Some(a?.apart.min(b?.apart))
     }
 
-    /// Flight time with this manoeuvre for an evidence of [`ENOUGH`], s; `None` if a separation is missing.
+    /// Flight time in which repetitions of this manoeuvre reach a separation of [`ENOUGH`], s; `None` if a separation is
+    /// missing.
     pub fn seconds(&self) -> Option<f64> {
         self.apart().map(|apart| self.duration_s * ENOUGH / apart)
     }
 }
 
-/// Expected discrimination of `suspects`, both missing from `model`, by the menu's manoeuvres, the fastest first.
+/// How well each manoeuvre of the menu discriminates the effects `suspects`, which are missing from `model`. The manoeuvre
+/// with the shortest flight time is first.
 ///
-/// `controller` flies the manoeuvres, with the sensor noise of a small autopilot. `progress` reports the fraction of
-/// manoeuvres simulated.
+/// `controller` flies the manoeuvres. The separations are computed for the sensor noise of a small autopilot. `progress`
+/// gets the fraction of the manoeuvres that have been simulated.
 ///
 /// # Errors
 ///
@@ -136,7 +139,7 @@ pub fn prospects(
 pub struct Plan {
     /// The chosen manoeuvre.
     pub manoeuvre: &'static Manoeuvre,
-    /// Flight time for an evidence of [`ENOUGH`], s.
+    /// Flight time in which the manoeuvre reaches a separation of [`ENOUGH`], s.
     pub seconds: f64,
     /// Number of repetitions, on alternating headings.
     pub times: usize,
@@ -169,8 +172,8 @@ fn truth(model: &GreyBox, suspect: &Suspect) -> Result<GreyBox, DesignError> {
     Ok(with)
 }
 
-/// Values of the effect's coefficients: the given values, else clearly visible ones, else the middle of the search's
-/// starting values.
+/// Values of the effect's coefficients: the given values if there are any. Otherwise they are clearly visible values or, if
+/// these are unknown, the middle one of the search's starting values.
 fn values(model: &GreyBox, suspect: &Suspect) -> Result<Vec<f64>, DesignError> {
     if !suspect.values.is_empty() {
         return Ok(suspect.values.clone());
@@ -191,9 +194,9 @@ fn values(model: &GreyBox, suspect: &Suspect) -> Result<Vec<f64>, DesignError> {
     middle.ok_or_else(|| DesignError::Amplitude { id: id.into() })
 }
 
-/// Candidate models for fitting the effect to data of `model`, one list for each set of starting values. A list has one
-/// copy of `model` for each linear coefficient that is not zero. An effect with fewer than two linear coefficients has
-/// one copy with the whole effect.
+/// Candidate models for fitting the effect to data of `model`. There is one list for the effect's own values and one for each
+/// set of starting values. A list has one copy of `model` for each linear coefficient that is not zero. An effect with fewer
+/// than two linear coefficients has one copy with the whole effect.
 ///
 /// # Errors
 ///
@@ -222,7 +225,7 @@ pub fn alternatives(model: &GreyBox, suspect: &Suspect) -> Result<Vec<Vec<GreyBo
     all.map(one).collect()
 }
 
-/// The simulated flight of `schedule` by `truth`; `None` if it leaves the bounds of a schedule.
+/// The flight along `schedule`, simulated with the model `truth`; `None` if it leaves the bounds of a schedule.
 fn imagine(
     truth: &GreyBox,
     controller: &dyn Controller,
@@ -265,7 +268,7 @@ fn imagine(
         notes: Vec::new(),
     };
     let mut prepared = Prepared::new(&flight, 0.0)?;
-    // The simulated flight has no noise. The separation accounts for sensor noise.
+    // the simulated flight has no noise, but the separation accounts for sensor noise
     (prepared.noise, prepared.force_noise) = (noise, force_noise);
     Ok((!prepared.windows.is_empty()).then_some(prepared))
 }

@@ -32,7 +32,7 @@ pub trait Environment {
     ///
     /// # Errors
     ///
-    /// If the plant cannot be set there.
+    /// If the plant cannot be set to this state.
     fn reset(&mut self) -> Result<Observation, Trouble>;
     /// Advances one step under `command`, clamped to its ranges.
     ///
@@ -46,8 +46,8 @@ pub trait Environment {
     fn reseed(&mut self, _seed: u32) {}
 }
 
-/// One aircraft simulated by a model, with the exact actuator filters as its state. For many at once, in training,
-/// see `sim::imagined`.
+/// One aircraft simulated by a model and its exact actuator filters. The module `sim::imagined` simulates many aircraft at
+/// once for training.
 #[derive(Clone, Debug)]
 pub struct Imagined {
     model: GreyBox,

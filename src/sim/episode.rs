@@ -121,7 +121,7 @@ impl Outcome {
     }
 
     fn flown(track: Track, cost: Vec<Duration>) -> Outcome {
-        // the initial observation precedes the first step
+        // the first sample precedes the first step and is not scored
         let errors: Vec<[f64; 2]> = track.moments[1..]
             .iter()
             .map(|m| attitude_error_deg(m.attitude, &track.target))

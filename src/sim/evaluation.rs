@@ -35,9 +35,9 @@ pub struct Evaluation {
     pub groups: Vec<Score>,
     /// Computing time per step.
     pub ms_per_step: Cost,
-    /// The limits against which the flights are measured; `None` without measurement.
+    /// The limits for the quality measures; `None` if the quality was not measured.
     pub limits: Option<Limits>,
-    /// Every flight with its measures, in the order of the targets; empty without measurement.
+    /// Every flight with its quality measures, in the order of the targets; empty if the quality was not measured.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub flights: Vec<Scored>,
 }
@@ -86,12 +86,12 @@ pub struct Score {
     pub divergence_rate: f64,
     /// 95 % bootstrap interval of the divergence rate.
     pub divergence_ci95: [f64; 2],
-    /// Fraction of the flights within the limits of load factor and angle of attack; NaN without measurement.
+    /// Fraction of the flights within the limits of load factor and angle of attack; NaN if the quality was not measured.
     /// Transients are allowed, see [`TRANSIENT`](greylag_control::quality::TRANSIENT).
     pub kept_rate: f64,
     /// Fraction of the flights that overshoot roll and pitch by at most 1° or 3 % of the step, whichever is larger.
     pub little_overshoot_rate: f64,
-    /// Summary of each quality measure by its id; empty without measurement.
+    /// Summary of each quality measure by its id; empty if the quality was not measured.
     pub measures: Spreads,
 }
 
@@ -106,7 +106,7 @@ pub struct Cost {
     pub p999: f64,
 }
 
-/// Makes a controller for a thread.
+/// Function that makes a controller for a thread.
 pub type Make<'a> = &'a (dyn Fn() -> Box<dyn Controller> + Sync);
 
 /// Flies `rows` in JSBSim on all cores, with a controller of `make` on each thread. `done` is called after each flight.
@@ -186,7 +186,8 @@ pub struct Robustness {
 
 impl Robustness {
     /// Monte Carlo simulation over the uncertainty of `model`: flies `courses` in draws 0 to `draws` − 1 of the seed
-    /// `seed`, see [`GreyBox::drawn`]. `done` is called after each draw.
+    /// `seed`, see [`GreyBox::drawn`]. `controller` and `name` are the names of the controller and of the model. `done` is
+    /// called after each draw.
     ///
     /// # Errors
     ///
@@ -278,7 +279,7 @@ struct Sums {
     cost: Thinned,
 }
 
-/// Inputs of a score from one flight.
+/// Results of one flight that enter the scores.
 struct Flown {
     group: Option<Group>,
     settled_deg: f64,
@@ -311,7 +312,7 @@ impl Sums {
             .into_iter()
             .map(|group| Score::new(group.name(), &of(&|g| g == Some(group))))
             .collect();
-        // "all" means the targets of Table II, of which no group may be missing
+        // "all" means the targets of Table II and requires that neither of its two groups is missing
         if groups[..2].iter().all(|score| score.count > 0) {
             let table = |g| matches!(g, Some(Group::Easy | Group::HardCorners));
             groups.push(Score::new("all", &of(&table)));
@@ -341,7 +342,7 @@ impl Evaluation {
         sums.evaluation([controller, model], None)
     }
 
-    /// Summarises `outcomes` of `courses`, measured against `limits`.
+    /// Summarises `outcomes` of `courses` with the quality measures for `limits`. `names` are those of controller and model.
     pub fn measured(
         names: [&str; 2],
         courses: &[Course],

@@ -7,7 +7,7 @@ use greylag_control::{Controller, Target};
 use greylag_manoeuvres::{PITCH_MAX_DEG, ROLL_MAX_DEG, Schedule, Scheduled};
 use greylag_physics::Command;
 
-/// Factor by which the excitation is reduced after the aircraft has left its bounds.
+/// Factor by which the excitation is multiplied after the aircraft has left the bounds of a schedule.
 const GENTLER: f64 = 0.75;
 /// Number of flights after which the aircraft counts as unflyable.
 const TRIES: usize = 7;
@@ -54,7 +54,7 @@ pub enum FlightTestError {
 ///
 /// # Errors
 ///
-/// If the plant cannot be built, a state is not finite, or the aircraft leaves the bounds.
+/// If the plant cannot be built, a state is not finite, or the aircraft leaves the bounds of a schedule.
 pub fn fly(
     plant: &PlantOptions,
     controller: &dyn Controller,
@@ -85,12 +85,12 @@ pub fn fly(
     Ok(flown)
 }
 
-/// Flies as [`fly`]. While the aircraft leaves its bounds, the flight is repeated with less excitation, up to six
-/// times.
+/// Flies `schedule` like [`fly`]. If the aircraft leaves the bounds of a schedule, the flight is repeated with less
+/// excitation, up to six times.
 ///
 /// # Errors
 ///
-/// The same as [`fly`], of the last schedule tried.
+/// The same as [`fly`], for the last repetition.
 pub fn fly_within_bounds(
     plant: &PlantOptions,
     controller: &dyn Controller,

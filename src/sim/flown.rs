@@ -59,7 +59,7 @@ impl World for Flown {
     }
 
     fn step(&mut self, _block: usize, action: &[Block; ACTIONS]) -> Result<Stepped, Trouble> {
-        // if a state is not finite, the aircraft is lost in its last finite state
+        // if a state is not finite, the aircraft counts as lost, and its last finite state is used
         let left = match self.simulator.step(command(action.map(|x| x.0[0].into()))) {
             Ok(seen) => {
                 self.seen = seen;

@@ -33,7 +33,7 @@ pub fn hidden(effect: &Written, values: &[f64]) -> Result<Hidden, String> {
     Ok(Hidden::written(effect.about.id, functions, writer.filters))
 }
 
-/// JSBSim's place for a channel, and its unit (lbf or lbf ft) in N or N m.
+/// The axis of JSBSim to which a channel belongs, and JSBSim's unit (lbf or lbf ft) in N or N m.
 fn place(channel: Channel) -> (Place, f64) {
     match channel {
         Channel::Drag => (Place::Drag, LBF),
@@ -129,7 +129,7 @@ impl Writer<'_> {
             Node::Power(base, n) => Ok(element("pow", &[self.xml(base)?, number(f64::from(*n))])),
             Node::Table(x, points) => {
                 let x = self.xml(x)?;
-                // checked before it is written, because every pair of points repeats `x`
+                // the length is checked before writing, because every pair of points repeats `x`
                 match x.len().saturating_mul(points.len()) > LONGEST {
                     true => Err(too_long()),
                     false => Ok(table(&x, points)),
@@ -151,7 +151,7 @@ impl Writer<'_> {
         self.values.get(parameter).copied().unwrap_or(0.0)
     }
 
-    /// Output property of the filter for `function`. Equal filters are written once.
+    /// The JSBSim property that is the output of the filter for `function`. Equal filters are written once.
     fn filter(&mut self, function: Function, all: &[Expression]) -> Result<String, String> {
         let time_s = match all.get(1).map(|e| &e.node) {
             Some(Node::Parameter(k)) => self.value(*k),

@@ -19,8 +19,8 @@ pub const WIDTH: usize = ROW;
 /// Number of steps of an episode, 10 ms each. Episodes in JSBSim have the same number.
 pub const STEPS: u32 = 1000;
 
-/// Validity limits of the model, at which the episode ends: angles θ, α, β (rad), rates p, q, r (rad/s), airspeed
-/// (m/s).
+/// Validity limits of the model. An episode ends when θ, α or β (rad), a rate p, q, r (rad/s) or the airspeed (m/s) exceeds
+/// its limit.
 const ENVELOPE: Envelope =
     Envelope { pitch: 1.48, incidence: 1.0, rate: 25.0, airspeed: [4.0, 60.0] };
 
@@ -54,8 +54,8 @@ pub struct Stepped {
     pub ended: [Ended; WIDTH],
 }
 
-/// Many aircraft simulated by a model at once, for training. Each has its own target, actuator filters and episode. To
-/// fly a controller in one aircraft, use [`Imagined`](crate::environment::Imagined).
+/// Many aircraft simulated by a model at once, for training. Each has its own target, actuator filters and episode. A single
+/// aircraft for a controller is [`Imagined`](crate::environment::Imagined).
 ///
 /// The state includes the complete memories of the actuator filters. The air density is constant, since it would change
 /// by less than 1 % over an episode.
@@ -114,7 +114,7 @@ impl Imagination {
         imagination
     }
 
-    /// Starts new episodes. Their targets skip the first `targets` of the random sequence.
+    /// Starts new episodes. Their targets follow the first `targets` ones of the random sequence.
     pub fn restart(&mut self, targets: u64) {
         self.targets.go_on_after(targets);
         for k in 0..self.batches.len() {

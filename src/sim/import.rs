@@ -22,19 +22,20 @@ use wing::measure;
 
 /// Metres in a foot.
 const FT: f64 = 0.3048;
-/// Incidence at which derivatives are taken, rad: 3°.
+/// Angle of attack at which derivatives are taken, rad: 3°.
 const ALPHA: f64 = 0.052;
 /// Half interval of angles, rad: 2°.
 const ANGLE: f64 = 0.035;
-/// Larger sideslip for a second value of the drag, rad: 8°.
+/// Larger sideslip at which the drag is evaluated a second time, rad: 8°.
 const FAR: f64 = 4.0 * ANGLE;
 /// Half interval of the dimensionless rates pb/2V, qc/2V and rb/2V.
 const RATE: f64 = 0.005;
-/// Pitch angle at which gravity curves the flight path differently from level flight, rad: 60°.
+/// Pitch angle of the second attitude for the derivatives with respect to α̇, rad: 60°. Gravity curves the flight path there
+/// less than in level flight.
 const ATTITUDE: f64 = 1.05;
-/// Half interval of surface commands, −1..1 being the travel.
+/// Half interval of surface commands (−1..1).
 const COMMAND: f64 = 0.2;
-/// Incidences of the tables, degrees.
+/// Angles of attack of the tables, degrees.
 const TABLE_DEG: [f64; 24] = [
     -24.0, -20.0, -17.0, -14.0, -12.0, -10.0, -8.0, -6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0, 8.0,
     10.0, 12.0, 14.0, 16.0, 18.0, 20.0, 22.0, 25.0, 30.0,
@@ -52,7 +53,7 @@ pub struct Imported {
 }
 
 impl Imported {
-    /// Writes the held properties into the airframe file.
+    /// Adds `held`, the JSBSim properties that are held constant with their values, to the airframe file.
     pub fn hold(&mut self, held: &[(String, f64)]) {
         if !held.is_empty() {
             self.airframe.push_str("\n# Held in the simulator: the model is of the aircraft in this condition.\n[conditions]\n");
@@ -96,7 +97,7 @@ pub enum ImportError {
         /// Value of the property, in feet or square feet.
         value: f64,
     },
-    /// The aircraft has no positive lift at any incidence of the tables.
+    /// The aircraft has no positive lift at any angle of attack of the tables.
     #[error(
         "the aircraft has no lift at {airspeed:.1} m/s: give the airspeed at which it flies with --cruise-mps"
     )]
@@ -114,8 +115,8 @@ struct Subject<'a> {
     span: f64,
     chord: f64,
     mass: MassProperties,
-    /// Slopes of the coefficients over the rate of incidence, α̇c/2V. Their contribution is removed from every
-    /// evaluation.
+    /// Derivatives of the coefficients with respect to α̇c/2V, the dimensionless rate of the angle of attack. Their
+    /// contribution is removed from every evaluation.
     alpha_rate: Coefficients,
 }
 
@@ -184,7 +185,7 @@ pub fn import(
     })
 }
 
-/// Lift, drag and pitching moment over incidence.
+/// Coefficients of lift, drag and pitching moment over the angle of attack (rad).
 struct Polar {
     alpha: Vec<f64>,
     lift: Vec<f64>,
@@ -193,7 +194,7 @@ struct Polar {
 }
 
 impl Polar {
-    /// The smallest incidence (rad) at which the interpolated lift coefficient reaches `lift`; 0 if it does not.
+    /// The smallest angle of attack (rad) at which the interpolated lift coefficient reaches `lift`; 0 if there is none.
     fn incidence(&self, lift: f64) -> f64 {
         let reaches = self.lift.windows(2).position(|w| w[0] < lift && lift <= w[1]);
         reaches.map_or(0.0, |k| {
@@ -211,7 +212,7 @@ struct Beside {
     aileron: Option<AileronOverIncidence>,
 }
 
-/// Slopes of the coefficients at the incidence [`ALPHA`].
+/// Derivatives of the coefficients at the angle of attack [`ALPHA`].
 struct Slopes {
     base: Coefficients,
     beta: Coefficients,
@@ -221,7 +222,7 @@ struct Slopes {
     aileron: Coefficients,
     elevator: Coefficients,
     rudder: Option<Coefficients>,
-    /// Drag over |sideslip| and its square, and over |elevator|.
+    /// Derivatives of the drag coefficient with respect to |β| and β². `drag_elevator` is that with respect to |elevator|.
     drag_beta: [f64; 2],
     drag_elevator: f64,
 }
@@ -245,7 +246,7 @@ impl Subject<'_> {
         0.5 * loads.truth.air_density_kgpm3 * loads.truth.airspeed_mps.powi(2) * self.area
     }
 
-    /// Coefficients of `loads` without the contribution of the rate of incidence.
+    /// Coefficients of `loads` without the contribution of α̇.
     fn steady(&mut self, loads: &Loads, pressure: f64) -> Result<Coefficients, PlantError> {
         let rate = self.incidence_rate(loads.truth.airspeed_mps)?;
         let all = self.coefficients(loads, pressure);
@@ -258,8 +259,8 @@ impl Subject<'_> {
         Ok(rate * self.chord / (2.0 * airspeed))
     }
 
-    /// Slopes of the coefficients over α̇c/2V, from two attitudes with the same airflow. Gravity curves the flight path
-    /// at a different rate in each attitude.
+    /// Derivatives of the coefficients with respect to α̇c/2V, from two attitudes with the same airflow. Gravity curves the
+    /// flight path at a different rate in each attitude.
     fn alpha_rate(&mut self) -> Result<Coefficients, PlantError> {
         let mut sides = [([0.0; 6], 0.0); 2];
         for (side, pitch_rad) in sides.iter_mut().zip([0.0, ATTITUDE]) {
@@ -284,7 +285,7 @@ impl Subject<'_> {
         [drag, side, lift, moments[0], moments[1], moments[2]].map(|c| c / pressure)
     }
 
-    /// Lift, drag and pitching moment over incidence, with the largest lift coefficient.
+    /// Lift, drag and pitching moment over the angle of attack, and the largest lift coefficient.
     fn polar(&mut self) -> Result<(Polar, f64), PlantError> {
         let alpha: Vec<f64> = TABLE_DEG.iter().map(|a| a.to_radians()).collect();
         let mut polar = Polar { alpha, lift: vec![], drag: vec![], pitch: vec![] };
@@ -299,7 +300,8 @@ impl Subject<'_> {
         Ok((polar, most))
     }
 
-    /// Central difference of the coefficients between two states, per `unit`.
+    /// Evaluates the coefficients on both sides of the reference state. `of` sets the two states and inputs. Returns the
+    /// central difference of the coefficients per `unit`, and their mean.
     fn slope(
         &mut self,
         unit: f64,
@@ -318,7 +320,7 @@ impl Subject<'_> {
         Ok((odd, even))
     }
 
-    /// Slopes of the coefficients about the reference state.
+    /// Derivatives of the coefficients about the reference state.
     fn slopes(&mut self, travel: &Travel) -> Result<Slopes, PlantError> {
         let base = self.at(&Start { alpha_rad: ALPHA, ..self.start }, &Inputs::default())?;
         let v = self.start.airspeed_mps;
@@ -365,12 +367,12 @@ impl Subject<'_> {
     }
 }
 
-/// Deflection at [`COMMAND`], mean of both sides, rad.
+/// Deflection at the command [`COMMAND`], rad: the mean of both sides.
 fn at_command(stops: Stops) -> f64 {
     COMMAND * 0.5 * (stops.most_rad - stops.least_rad)
 }
 
-/// a and b of a |β| + b β² from the values at [`ANGLE`] and [`FAR`].
+/// The coefficients a and b of the function a |β| + b β² from its values at [`ANGLE`] and [`FAR`].
 fn size_and_square([near, far]: [f64; 2]) -> [f64; 2] {
     let square = (far / FAR - near / ANGLE) / (FAR - ANGLE);
     [near / ANGLE - square * ANGLE, square]

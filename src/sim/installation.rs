@@ -7,7 +7,7 @@ use rand::RngExt;
 use greylag_logs::{Flight, Sample};
 use greylag_num::stream::stream;
 
-/// Random stream from which the errors are drawn.
+/// Id of the random stream from which the errors are drawn.
 const DRAW: u64 = 73;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 

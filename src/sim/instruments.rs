@@ -1,4 +1,4 @@
-//! Sensor model: makes the log of a simulated flight, with sensor errors.
+//! Sensor model, which converts a simulated flight to a log with sensor errors.
 
 use std::f64::consts::TAU;
 
@@ -130,7 +130,7 @@ impl Instruments {
         let late = |group: Group, get: &dyn Fn(&Truth) -> f64| {
             get(now) + self.late[group as usize] / DT_S * (get(before) - get(now))
         };
-        // unwrapped to within half a turn of the present angle, to avoid interpolation across ±π
+        // the angle is unwrapped to within half a turn of the present angle, to avoid interpolation across ±π
         let turn = |get: &dyn Fn(&Truth) -> f64| {
             late(Group::Attitude, &|t| get(t) - TAU * ((get(t) - get(now)) / TAU).round())
         };

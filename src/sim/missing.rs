@@ -8,10 +8,10 @@ use greylag_model::GreyBox;
 use greylag_num::stream::{Stream, stream};
 use greylag_physics::formula::Written;
 
-/// Random stream of missing effects.
+/// Id of the random stream of missing effects.
 const DRAW: u64 = 80;
 
-/// Scale factors from the aircraft for which [`KINDS`] is written to another aircraft.
+/// Factors that scale the amplitudes in [`KINDS`], which are those of one aircraft, to another aircraft.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Craft {
     /// Factors on amplitudes by unit: N, m, N m, N m s, kg m².
@@ -31,7 +31,7 @@ pub struct Craft {
 }
 
 impl Craft {
-    /// Sizes of `reference`, the model that matches the simulator.
+    /// The factors for the aircraft of `reference`, the model that matches the simulator.
     pub fn of(reference: &GreyBox) -> Craft {
         let value = |name: &str| {
             reference.coefficients().iter().find(|c| c.name == name).map_or(0.0, |c| c.value)
@@ -60,7 +60,7 @@ impl Craft {
         }
     }
 
-    /// Sizes of a simulated aircraft `model`, from which any effect may be missing.
+    /// The factors for the aircraft of `model`, for which `Craft::kinds` has every effect of [`KINDS`].
     pub fn lacking(model: &GreyBox) -> Craft {
         let own = ["lift_table", "drag_beta2", "drag_elevator_abs"].map(str::to_owned);
         let craft = Craft::of(model);
@@ -72,8 +72,8 @@ impl Craft {
         self.has.iter().any(|has| has == id)
     }
 
-    /// All effects that can be missing, with this aircraft's amplitudes. An effect that replaces one of the aircraft's
-    /// effects is included only if the reference has the replaced effect.
+    /// All effects that can be missing, with this aircraft's amplitudes. Some effects replace one of the aircraft's own
+    /// effects. They are included only if the reference has the replaced effect.
     pub fn kinds(&self) -> Vec<MissingKind> {
         let own = |kind: &&MissingKind| match kind.id {
             "lift_stall" => self.has("lift_table"),
@@ -106,7 +106,7 @@ impl Craft {
     }
 }
 
-/// Sizes of the aircraft for which the amplitudes of [`KINDS`] are written.
+/// Properties of an aircraft from which amplitudes are scaled.
 struct Sizes {
     mass: f64,
     chord: f64,
@@ -117,7 +117,7 @@ struct Sizes {
     stiffness: f64,
 }
 
-/// The Skywalker X8: kg, m, kg m², m/s, Cmα.
+/// The Skywalker X8, for which the amplitudes of [`KINDS`] are given. The units are kg, m, kg m² and m/s; the stiffness is Cmα.
 const WRITTEN: Sizes = Sizes {
     mass: 3.364,
     chord: 0.3571,
@@ -149,7 +149,7 @@ const fn both(id: &'static str, unit: &'static str, clear: [f64; 2]) -> MissingK
     MissingKind { id, unit, clear, either_sign: true }
 }
 
-/// Effects that are removed from the aircraft's model if the model has them. The simulator is unchanged.
+/// Effects that can be missing if the aircraft's model has them. They are removed from the model; the simulator is unchanged.
 const OF_THE_MODEL: [MissingKind; 2] =
     [kind("rudder_linear", "", [1.0, 1.0]), kind("propeller", "", [1.0, 1.0])];
 
@@ -199,7 +199,7 @@ impl MissingKind {
         self.allowed(rounded(signed))
     }
 
-    /// The largest amplitude at which the aircraft still follows its schedule; for a rate limit, the smallest.
+    /// The largest |amplitude| at which the aircraft still follows its schedule; the smallest one for a rate limit.
     pub fn most(&self) -> f64 {
         let largest = self.clear[0].abs().max(self.clear[1].abs());
         match self.id {
@@ -212,7 +212,7 @@ impl MissingKind {
         }
     }
 
-    /// The nearest representable amplitude: a delay is a whole number of 10 ms steps.
+    /// `amplitude`, rounded if it is a delay: the simulator represents only delays of a whole number of 10 ms steps.
     pub fn allowed(&self, amplitude: f64) -> f64 {
         if self.id == "time_delay" {
             (100.0 * amplitude).round().max(1.0) / 100.0
@@ -234,11 +234,11 @@ pub struct Missing {
     pub id: &'static str,
     /// Amplitude in the unit of [`MissingKind::unit`].
     pub amplitude: f64,
-    /// Addition to the JSBSim aircraft; `None` where its file has the effect.
+    /// The effect that is added to the JSBSim aircraft; `None` if the aircraft's own file has the effect.
     pub hidden: Option<Hidden>,
     /// Id of the effect that is removed from the model; `None` if no effect is removed.
     pub taken_out: Option<&'static str>,
-    /// True values of the catalogue entry's coefficients; empty where the entry only approximates the effect.
+    /// True values of the coefficients of the catalogue's effect; empty if this effect only approximates the true one.
     pub values: Vec<f64>,
 }
 
@@ -267,7 +267,7 @@ pub enum MissingError {
 }
 
 impl Missing {
-    /// The effect `id`; `amplitude` includes the same effect of the aircraft `craft` itself.
+    /// The effect `id` with a total `amplitude`, which includes the same effect of the aircraft `craft` itself.
     ///
     /// # Errors
     ///

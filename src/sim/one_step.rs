@@ -8,7 +8,7 @@ use greylag_physics::Command;
 /// Angular frequencies of the sines on aileron, elevator, throttle and rudder, rad per step.
 const WAVES: [f64; 4] = [0.11, 0.13, 0.05, 0.07];
 
-/// A flight in which the model's LQI holds attitudes, with a sine added to each command.
+/// A flight in which the model's LQI holds attitudes, while a sine is added to each command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flight {
     /// Length in steps of 0.01 s.
@@ -22,8 +22,8 @@ pub struct Flight {
 /// One-step prediction errors of a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
-    /// RMS error of the predicted state change over the flight, in multiples of the state's scale x_c per second, in
-    /// the order of `State::to_array`.
+    /// RMS error of the predicted state changes over the flight, divided by the step and by the state's scale x_c, 1/s. The
+    /// order is that of `State::to_array`.
     pub rms: [f64; 8],
     /// Observation after the last step.
     pub last: Observation,

@@ -7,7 +7,7 @@ use greylag_control::Observation;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{ActuatorState, Command, State, Time};
 
-/// One aircraft in JSBSim, as an environment.
+/// One aircraft in JSBSim with its initial state.
 pub struct Simulator {
     plant: Plant,
     start: Start,

@@ -1,4 +1,4 @@
-//! Writes the initial model of a search for missing effects, with coefficient errors and without some effects.
+//! Writes the initial model of a search for missing effects. Its coefficients have errors, and some effects are removed.
 
 use std::fmt::Write;
 
@@ -12,9 +12,9 @@ use greylag_physics::size::Size;
 /// Standard deviation of the coefficient errors, as a fraction of the value. Errors are limited to two standard
 /// deviations.
 pub const WRONG: f64 = 0.15;
-/// Random stream of the errors.
+/// Id of the random stream of the errors.
 const DRAW: u64 = 81;
-/// Range of angle of attack, rad, of the line that replaces the lift table: −4° to 7°, between negative and positive
+/// Range of the angle of attack in which a line approximates the lift table, rad: −4° to 7°, between negative and positive
 /// stall.
 const LINE: [f64; 2] = [-0.069_813_2, 0.122_173];
 
@@ -24,7 +24,7 @@ const LINE: [f64; 2] = [-0.069_813_2, 0.122_173];
 ///
 /// # Errors
 ///
-/// If the reference is no model file, or lacks an effect that is to be removed.
+/// If `reference` is not the text of a model file, or lacks an effect that is to be removed.
 pub fn starting_model(
     reference: &str,
     name: &str,
@@ -57,7 +57,7 @@ pub fn starting_model(
     Ok(text(&file))
 }
 
-/// Intercept and slope (1/rad) of the line through the ends of [`LINE`] in the table of an effect `lift_table`.
+/// Intercept and slope (1/rad) of the line through the two values of an effect `lift_table` at the ends of [`LINE`].
 fn line(effect: &toml::Value) -> Option<[f64; 2]> {
     let table = effect.get("CL")?;
     let list = |key: &str| -> Option<Vec<f64>> {
@@ -138,7 +138,7 @@ fn possible(effect: &str, name: &str, value: f64) -> f64 {
     }
 }
 
-/// Text of a model file with the order of the shipped files and one line for each number.
+/// Text of a model file with sections in the order of the shipped files and one line for each number.
 fn text(file: &toml::Table) -> String {
     let mut out = String::new();
     let is_section = |value: &toml::Value| {
@@ -162,7 +162,8 @@ fn text(file: &toml::Table) -> String {
     out
 }
 
-/// A key as in a TOML file: quoted if it has other characters than letters, digits, `_` and `-`, as the name of a log.
+/// A key as in a TOML file. A key with characters other than letters, digits, `_` and `-` is quoted, for example the name of a
+/// log.
 fn key(name: &str) -> String {
     let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     match !name.is_empty() && name.chars().all(bare) {

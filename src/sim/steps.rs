@@ -10,10 +10,10 @@ use greylag_physics::Airframe;
 
 /// Id of the random stream.
 const STREAM: u64 = 242;
-/// Steps of 10 ms for which the first attitude is held: 5 s, within which every controller of this program settles or
+/// Number of 10 ms steps for which the first attitude is held: 5 s. In this time every controller of this program settles or
 /// loses the aircraft.
 const HELD: usize = 500;
-/// Steps of 10 ms for which the second attitude is held and scored: 8 s, as in the demonstration.
+/// Number of 10 ms steps for which the second attitude is held and scored: 8 s, as in `greylag demo`.
 const SCORED: usize = 800;
 
 /// `count` steps from one attitude to another, drawn from `seed`. Both attitudes are uniformly distributed over the

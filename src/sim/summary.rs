@@ -1,4 +1,5 @@
-//! Summary of quality measures over many flights: median with interval, and the worst. Decimation of long series.
+//! Summary of quality measures over many flights by their median, its confidence interval and the worst value. Decimation of
+//! long series.
 
 use std::collections::BTreeMap;
 
@@ -43,8 +44,8 @@ pub fn spreads(flights: &[&Quality]) -> Spreads {
 /// Largest number of values in a [`Thinned`] series.
 const MOST: usize = 4_000_000;
 
-/// A series with at most 4 million values in memory. A longer series is represented by every second value, every fourth
-/// value, and so on.
+/// A series with at most 4 million values in memory. Of a longer series only every second value is kept, or every fourth, and
+/// so on.
 #[derive(Clone, Debug)]
 pub struct Thinned {
     kept: Vec<f64>,

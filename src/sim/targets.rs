@@ -10,8 +10,8 @@ use greylag_control::Target;
 use greylag_num::stream;
 use greylag_physics::{Airframe, State};
 
-/// Difficulty of a target. The hard targets of Table II of \[GSFM26\] can be read in two ways, as corners or as outside
-/// of the easy box.
+/// Difficulty of a target. Table II of \[GSFM26\] can be read in two ways: the hard targets lie in the corners, or anywhere
+/// outside the box of the easy targets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Group {
@@ -19,7 +19,7 @@ pub enum Group {
     Easy,
     /// |roll| in 45..60° with |pitch| in 25..30°: all four corners.
     HardCorners,
-    /// |roll| up to 60° and |pitch| up to 30°, anywhere outside the easy box.
+    /// |roll| up to 60° and |pitch| up to 30°, anywhere outside the box of the easy targets.
     HardOutside,
 }
 
@@ -38,8 +38,8 @@ pub struct Row {
     pub pitch_deg: f64,
 }
 
-/// Number of bins of roll and of pitch. Every cell is used once before any cell is used again (section IV-A of
-/// \[GSFM26\]).
+/// Number of bins in roll, and in pitch. Each pair of a roll bin and a pitch bin is used once before any pair is used again
+/// (section IV-A of \[GSFM26\]).
 const BINS: usize = 5;
 /// Id of the random stream of [`Stratified`].
 const STRATIFIED: u64 = 241;
@@ -59,13 +59,13 @@ pub struct Stratified {
 
 /// Fraction of targets at the reference airspeed if other airspeeds are allowed.
 const SLOW: f64 = 0.5;
-/// Ratio of the smallest commanded airspeed to the envelope's smallest, and of the largest commanded airspeed to
-/// cruise.
+/// First the ratio of the smallest commanded airspeed to the envelope's smallest airspeed. Then the ratio of the largest
+/// commanded airspeed to the cruise airspeed.
 const WANTED: [f64; 2] = [1.15, 1.25];
 
 impl Stratified {
-    /// Targets of `seed` after the first `count`. A fraction `corners` (0..1) of them is drawn in the hard corners,
-    /// which cover 4 % of the envelope. The paper uses 0.
+    /// The target sequence of `seed`, which starts after its first `count` targets. A fraction `corners` (0..1) of the
+    /// targets is drawn in the hard corners, which cover 4 % of the envelope. The paper uses 0.
     pub fn new(seed: u64, count: u64, corners: f64) -> Stratified {
         let start = State::NEUTRAL.airspeed;
         Stratified { seed, count, corners, start, airspeeds: [start; 2], bins: Vec::new() }
@@ -122,7 +122,8 @@ impl Stratified {
     }
 }
 
-/// The target file: 140 easy targets, 100 in the hard corners, and 100 anywhere outside the easy box.
+/// A target file. The generated one has 140 easy targets, 100 in the hard corners, and 100 anywhere outside the box of the
+/// easy targets.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TargetFile {
     /// The targets in file order.

@@ -17,7 +17,7 @@ pub struct Tracking {
     pub insights: Vec<(usize, Insight)>,
 }
 
-/// Flies `steps` steps towards `target`.
+/// Flies towards `target` for `steps` steps of 10 ms.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! One trial of diagnosis: flights of an aircraft with an effect that its model lacks.
+//! A test case of the diagnosis: flights of an aircraft with an effect that its model lacks.
 
 use std::f64::consts::TAU;
 
@@ -18,17 +18,17 @@ use greylag_num::stream::stream;
 use greylag_physics::Airframe;
 use greylag_physics::airframe::Reference;
 
-/// Stream of the wind.
+/// Id of the random stream of the wind.
 const WIND: u64 = 82;
 /// Largest steady wind for an aircraft that cruises at `CRUISE_MPS`, m/s. It is scaled in proportion to the cruise airspeed.
 const WIND_MAX_MPS: f64 = 6.0;
-/// Wind 20 ft above ground of light turbulence, m/s (MIL-F-8785C).
+/// Wind speed at 20 ft above ground in light turbulence, m/s (MIL-F-8785C).
 const LIGHT_20FT_MPS: f64 = 7.6;
 
-/// The aircraft of a trial.
+/// The aircraft of a test case.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// The simulated aircraft: its initial state, and the JSBSim properties that are held constant. The trial adds wind,
+    /// The simulated aircraft: its initial state, and the JSBSim properties that are held constant. The test case adds wind,
     /// turbulence and hidden effects.
     pub plant: PlantOptions,
     /// Cruise airspeed, m/s.
@@ -68,7 +68,7 @@ impl Default for Subject {
     }
 }
 
-/// Conditions of a trial.
+/// Conditions of a test case.
 #[derive(Clone, Debug, Default)]
 pub struct Trial {
     /// The aircraft to be flown.
@@ -83,7 +83,7 @@ pub struct Trial {
     pub installed: Installation,
 }
 
-/// Logs of a trial.
+/// Logs of a test case.
 #[derive(Clone, Debug)]
 pub struct Logs {
     /// Flights for parameter estimation.
@@ -93,12 +93,12 @@ pub struct Logs {
 }
 
 impl Trial {
-    /// Flies the training and the test flights of the seed under `controller`. The excitation is reduced where the
-    /// aircraft would leave its bounds. Sensor errors are drawn anew for each flight.
+    /// Flies the training and the test flights of the seed with `controller`. The excitation is reduced if the aircraft
+    /// would leave the bounds of a schedule. Sensor errors are drawn anew for each flight.
     ///
     /// # Errors
     ///
-    /// If the aircraft cannot be built, or leaves its bounds even with the smallest excitation.
+    /// If the aircraft cannot be built, or leaves the bounds of a schedule even with the smallest excitation.
     pub fn fly(&self, controller: &dyn Controller) -> Result<Logs, FlightTestError> {
         let training = self.training(controller)?;
         let testing = flights::testing(self.seed);
@@ -118,7 +118,7 @@ impl Trial {
         schedules.iter().enumerate().map(|(k, s)| self.log(k, s, controller)).collect()
     }
 
-    /// The log of one schedule, the `k`-th flight of the trial.
+    /// Flies one schedule as the `k`-th flight of the test case, and returns its log.
     fn log(
         &self,
         k: usize,
@@ -133,7 +133,7 @@ impl Trial {
         Ok(log)
     }
 
-    /// The aircraft in the air of the `k`-th flight.
+    /// The aircraft with the wind and the turbulence of the `k`-th flight.
     fn plant(&self, k: usize) -> PlantOptions {
         let mut random = stream(self.seed, &[WIND, k as u64]);
         let calm = self.subject.cruise / CRUISE_MPS;

@@ -8,7 +8,7 @@ use greylag_control::policy::{ACTIONS, OBSERVATIONS};
 pub trait World {
     /// Number of aircraft.
     fn instances(&self) -> usize;
-    /// Observations of a block's aircraft. The last block may have more lanes than aircraft; those lanes are unused.
+    /// Observations of a block's aircraft. If the last block has more lanes than aircraft, the remaining lanes are unused.
     fn observe(&self, block: usize) -> [Block; OBSERVATIONS];
     /// Simulates the aircraft of a block for one time step.
     ///
@@ -16,8 +16,8 @@ pub trait World {
     ///
     /// If the environment cannot continue. The loss of an aircraft is not an error.
     fn step(&mut self, block: usize, action: &[Block; ACTIONS]) -> Result<Stepped, Trouble>;
-    /// Starts new episodes. Their targets skip the first `targets` of the random sequence, as resumed training
-    /// requires.
+    /// Starts new episodes. Their targets follow the first `targets` ones of the random sequence. Training that is resumed
+    /// thus continues the sequence.
     ///
     /// # Errors
     ///

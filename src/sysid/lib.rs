@@ -1,5 +1,5 @@
-//! System identification from flight logs: flight-path reconstruction, comparison of models with flights, ranking of
-//! missing effects, and amendment of a model.
+//! System identification from flight logs: reconstructs flight paths, compares models with flights, ranks the physical
+//! effects that a model lacks, and re-estimates models.
 
 #[cfg(feature = "study")]
 pub mod amend;

@@ -1,4 +1,4 @@
-//! Progress reports of a long task, and cancellation by their listener.
+//! Progress reports of a long task to a listener, which can cancel the task.
 
 use std::ops::ControlFlow;
 
@@ -10,7 +10,7 @@ pub struct Stage<'a> {
     /// Estimated share of the whole task that is done, 0 to 1. It may fall, for example when a search removes an
     /// effect.
     pub fraction: f64,
-    /// Candidates of a diagnosis in the current ranking, the best first. Empty before the ranking and in other tasks.
+    /// Candidate effects of a diagnosis, best first. Filled only in the stage after the first ranking; else empty.
     pub ranking: &'a [FirstLook],
 }
 
@@ -21,21 +21,23 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// A candidate effect in the first ranking, before tuning.
+/// A candidate effect in the first ranking, before any effect has been added to the model.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct FirstLook {
     /// Identifier of the effect.
     pub id: &'static str,
-    /// Evidence for the effect: the smaller of the penalised gain in likelihood and the Wald statistic, dimensionless.
+    /// Evidence for the effect, dimensionless: the smaller of the penalised likelihood gain (as in the BIC) and the
+    /// Wald statistic.
     pub evidence: f64,
-    /// Evidence that the best candidate reaches by chance if no effect is missing, dimensionless.
+    /// Critical value of the evidence, dimensionless. The best candidate exceeds it by chance, with the probability of
+    /// the significance level, if no effect is missing.
     pub threshold: f64,
 }
 
-/// Listener to the stages of a long task; `Break` cancels the task at the next stage.
+/// Function that a long task calls at each stage. If it returns `Break`, the task is cancelled.
 pub type Progress<'a> = dyn Fn(Stage<'_>) -> ControlFlow<()> + Sync + 'a;
 
-/// Discards progress and never cancels.
+/// Ignores the stage and never cancels the task.
 pub fn ignore_progress(_: Stage<'_>) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
@@ -45,7 +47,8 @@ pub fn ignore_progress(_: Stage<'_>) -> ControlFlow<()> {
 #[error("cancelled")]
 pub struct Cancelled;
 
-/// Reports a stage.
+/// Reports a stage without a ranking. `doing` is the current activity in words, `fraction` the share of the task that
+/// is done, 0 to 1.
 ///
 /// # Errors
 /// [`Cancelled`] if the listener answered `Break`.
@@ -53,7 +56,7 @@ pub fn report(progress: &Progress, doing: &str, fraction: f64) -> Result<(), Can
     not_cancelled(progress(Stage::new(doing, fraction)))
 }
 
-/// Converts a listener's answer: `Break` to [`Cancelled`].
+/// Converts a listener's answer to a result. `Break` becomes the error [`Cancelled`].
 pub fn not_cancelled(answer: ControlFlow<()>) -> Result<(), Cancelled> {
     match answer {
         ControlFlow::Continue(()) => Ok(()),
@@ -61,7 +64,8 @@ pub fn not_cancelled(answer: ControlFlow<()>) -> Result<(), Cancelled> {
     }
 }
 
-/// Listener for a part of a task: maps the fractions 0 to 1 of the part to the range `from` to `to` of the whole task.
+/// Returns a listener for a part of a task. It maps the fractions 0 to 1 of this part to the range `from` to `to` of
+/// the whole task and forwards the stages to `progress`.
 pub fn part<'a>(
     progress: &'a Progress<'a>,
     [from, to]: [f64; 2],

@@ -6,14 +6,14 @@ use greylag_logs::rudder::RudderMotion;
 use greylag_model::{GreyBox, RUDDER};
 use greylag_physics::airframe::Yaw;
 
-/// Channels that contain a rudder's forces and moments. Its deflection and the resulting sideslip also cause drag.
+/// Channels (forces and moments) on which a rudder acts. Its deflection and the resulting sideslip also cause drag.
 pub const CHANNELS: [ChannelId; 4] =
     [ChannelId::Drag, ChannelId::Side, ChannelId::Roll, ChannelId::Yaw];
 
-/// Largest rudder motion in `flights`; `None` if no rudder moves or `model` has a rudder effect.
+/// Returns the largest rudder motion in `flights`; `None` if no rudder moves or `model` has a rudder effect.
 ///
-/// A rudder command does not count if the airframe states that the aircraft has no rudder, because firmware sends rudder
-/// commands nevertheless.
+/// A rudder command does not count if the airframe states that the aircraft has no rudder, because firmware sends
+/// rudder commands nevertheless.
 pub fn unmodelled(flights: &[Reconstruction], model: &GreyBox) -> Option<RudderMotion> {
     if model.has(RUDDER) {
         return None;
@@ -28,7 +28,7 @@ pub fn unmodelled(flights: &[Reconstruction], model: &GreyBox) -> Option<RudderM
     all.max_by(|a, b| a.size().total_cmp(&b.size()))
 }
 
-/// Warning that the residuals contain a rudder's forces and moments.
+/// Text of a warning for the rudder motion `motion`: the residuals contain the rudder's forces and moments.
 pub fn warning(motion: RudderMotion) -> String {
     format!(
         "{motion} and the model has no rudder effect: yaw, roll, side-force and drag residuals include \
@@ -37,7 +37,8 @@ pub fn warning(motion: RudderMotion) -> String {
     )
 }
 
-/// Reason why an effect in a channel of `CHANNELS` is not asserted while an unmodelled rudder moves.
+/// Reason, in words, not to assert an effect in `CHANNELS`: a rudder moves by `motion`, and the model has no rudder
+/// effect.
 pub fn reason(motion: RudderMotion) -> String {
     let motion = motion.to_string();
     format!("t{}, and the model has no rudder effect for its channels", &motion[1..])

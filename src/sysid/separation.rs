@@ -1,4 +1,5 @@
-//! Separation of two candidate effects by flights: how well the flights distinguish them after a refit of the model.
+//! Separation of two candidate effects: how well a flight distinguishes them after the model's coefficients are
+//! refitted.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -6,28 +7,33 @@ use crate::weak_form::prepared::Prepared;
 use crate::weak_form::windows::{channels, columns};
 use greylag_model::GreyBox;
 
-/// Number of channels used: D, L, Y, l, m, n.
+/// Number of channels: the forces D, L, Y and the moments l, m, n.
 const CHANNELS: usize = 6;
-/// Ridge parameter of a free column, relative to the column's squared norm. It keeps a system with equal columns solvable.
+/// Ridge parameter of a regressor without a prior, relative to the regressor's squared norm. The normal equations then
+/// have a solution even if two regressors are equal.
 const RIDGE: f64 = 1e-9;
-/// Prior width of a sensor's constant error in a channel, in standard deviations of a window's noise.
+/// Prior standard deviation of a channel's constant error, in standard deviations of the noise of one window.
 const BIAS_WIDTH: f64 = 100.0;
 
-/// Squared difference in predictions due to an effect, in noise variances, after a refit. This is the unit of evidence.
+/// Squared difference between the predictions with and without an effect, summed over all windows and channels, in
+/// variances of the noise. The evidence of a diagnosis has the same unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Separation {
-    /// Squared difference that remains after the coefficients are refitted: a measure of the effect's detectability.
+    /// Difference that remains after the model's coefficients are refitted. It measures how detectable the effect is.
     pub visible: f64,
-    /// Squared difference that remains after the other effect is also fitted.
+    /// Difference that remains after the other effect is fitted as well. It measures how well the two effects are
+    /// distinguished.
     pub apart: f64,
 }
 
-/// Separation, by `flight`, of an effect from another effect. `truth` has the effect; `base` has neither of them.
+/// Computes how well `flight` shows an effect and distinguishes it from another effect. The model `truth` has the
+/// effect; `base` has neither effect.
 ///
-/// `others` holds the alternatives for fitting the other effect. An alternative is a set of models whose differences from
-/// `base` are scaled freely.
+/// `others` lists alternative sets of models that contain the other effect. The regressors of the other effect are the
+/// differences between the predictions of a set's models and those of `base`. Their coefficients are free. The set that
+/// fits best counts.
 ///
-/// The coefficients of `base` and a constant error in every channel are refitted within their prior widths.
+/// The coefficients of `base` and a constant error in every channel are refitted with their priors.
 pub fn separation(
     base: &GreyBox,
     truth: &GreyBox,
@@ -45,7 +51,8 @@ pub fn separation(
     Separation { visible, apart: apart.min(visible) }
 }
 
-/// Standard deviation of each channel's noise, in the channel's unit; infinite for a channel that is not measured.
+/// Standard deviation of each channel's noise in one window, in the channel's unit. It is infinite for a channel that
+/// is not measured or whose noise is not known; such a channel has no weight.
 fn noise(model: &GreyBox, flight: &Prepared) -> [f64; CHANNELS] {
     let mut scale = [f64::INFINITY; CHANNELS];
     for series in channels(model, flight) {
@@ -57,7 +64,8 @@ fn noise(model: &GreyBox, flight: &Prepared) -> [f64; CHANNELS] {
     scale
 }
 
-/// Measured less predicted in standard deviations of noise, in the order of channels, then windows; 0 if not measured.
+/// Measured minus predicted values, in standard deviations of the noise. All windows of the first channel come first,
+/// then those of the next channel. Values that are not measured are 0.
 fn residual(model: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> DVector<f64> {
     let windows = flight.windows.len();
     let mut all = DVector::zeros(CHANNELS * windows);
@@ -74,7 +82,7 @@ fn residual(model: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> DVec
     all
 }
 
-/// Regression columns of all refitted parameters, each multiplied by the prior width of its parameter.
+/// Regressors of all refitted parameters. Each is multiplied by the prior standard deviation of its parameter.
 fn refitted(base: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> Vec<DVector<f64>> {
     let windows = flight.windows.len();
     let found = columns(base, flight);
@@ -94,8 +102,9 @@ fn refitted(base: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> Vec<D
     all
 }
 
-/// Squared norm of `gap` after a least-squares fit of the columns `prior` and `free` is subtracted. The coefficients of
-/// `prior` have a prior with unit variance.
+/// Fits the regressors `prior` and `free` to `gap` by least squares. Returns the squared norm of the residual plus the
+/// sum of the squared coefficients of `prior`, whose prior has zero mean and unit variance. Zero if the normal
+/// equations cannot be solved.
 fn remaining(prior: &[DVector<f64>], free: Vec<DVector<f64>>, gap: &DVector<f64>) -> f64 {
     let free = free.into_iter().filter(|column| column.norm_squared() > 0.0);
     let columns: Vec<DVector<f64>> = prior.iter().cloned().chain(free).collect();
@@ -122,9 +131,9 @@ mod tests {
         let gap = DVector::from_vec(vec![3.0, 4.0, 12.0]);
         assert!((remaining(&[], Vec::new(), &gap) - 169.0).abs() < 1e-9);
         assert!((remaining(&[], vec![unit(2)], &gap) - 25.0).abs() < 1e-6);
-        // a column of length 3 and prior width 1: 3² − (3·3)²/(3² + 1) = 0.9 remains of 9
+        // a regressor of norm 3 with a prior: 3² − (3·3)²/(3² + 1) = 0.9 remains of the squared first entry, 3² = 9
         assert!((remaining(&[unit(0) * 3.0], vec![unit(2)], &gap) - 16.9).abs() < 1e-6);
-        // the same column twice gives the same result
+        // the same regressor twice gives the same result
         assert!((remaining(&[], vec![unit(2), unit(2)], &gap) - 25.0).abs() < 1e-6);
     }
 }

@@ -1,36 +1,36 @@
-//! Signature of an effect: the changes of forces and moments in sweeps of flow variables and controls, and the changes of the
-//! response to a manoeuvre.
+//! Signature of an effect: its changes of forces and moments over one variable at a time, and its changes of the
+//! aircraft's response to a manoeuvre.
 
 use greylag_model::{GreyBox, JoinError, STEP, Trim, TrimError, Twin};
 use greylag_physics::effects::Description;
 use greylag_physics::rigid_body;
 use greylag_physics::{Command, Controls, State};
 
-/// Altitude at which signatures are computed, m: the initial altitude of an episode.
+/// Altitude at which signatures are computed, m. Simulated flights start at the same altitude.
 const ALTITUDE: f64 = 600.0;
 
-/// Number of sweeps shown. The sweeps with the largest changes are selected.
+/// Largest number of sweeps in a signature. The sweeps with the largest changes are selected.
 const SWEEPS: usize = 4;
 
-/// Number of states shown in the manoeuvre. The states with the largest changes are selected.
+/// Largest number of states in the manoeuvre. The states with the largest changes are selected.
 const STATES: usize = 4;
 
 /// Number of points of a sweep.
 const POINTS: usize = 121;
 
-/// A change below this share of the quantity's range without the effect is negligible.
+/// A change is negligible below this fraction of the range that the quantity has without the effect.
 const NOTHING: f64 = 1e-4;
 
 /// Error of computing a signature.
 #[derive(Debug, thiserror::Error)]
 pub enum SignatureError {
-    /// The effect cannot join the model.
+    /// The effect cannot be added to the model.
     #[error(transparent)]
     Join(#[from] JoinError),
     /// The model has no level trim.
     #[error(transparent)]
     Trim(#[from] TrimError),
-    /// The effect is a measurement error.
+    /// The effect is a measurement error, which changes no force.
     #[error(
         "{id} is an error of the measurement: it changes no force, and the reconstruction of a flight decides it"
     )]
@@ -40,21 +40,21 @@ pub enum SignatureError {
     },
 }
 
-/// Changes caused by an effect.
+/// Curves of a model without and with an effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signature {
-    /// Changes along one variable at a time, in descending order of the change.
+    /// Forces and moments over one variable at a time, the largest change first.
     pub sweeps: Vec<Pair>,
-    /// Changes over time in [`MANOEUVRE`], in descending order of the change.
+    /// States over time in the [`MANOEUVRE`], the largest change first.
     pub manoeuvre: Vec<Pair>,
 }
 
-/// One quantity against another, without and with the effect.
+/// A curve of one quantity over another, without and with the effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pair {
-    /// The horizontal quantity with its unit.
+    /// Label of the horizontal axis, with its unit.
     pub x_label: &'static str,
-    /// The vertical quantity with its unit.
+    /// Label of the vertical axis, with its unit.
     pub y_label: &'static str,
     /// Values of the horizontal quantity.
     pub x: Vec<f64>,
@@ -89,7 +89,7 @@ const STATE_LABELS: [&str; 8] = [
     "sideslip, °",
 ];
 
-/// A flight condition.
+/// Flight condition at which accelerations are computed; the altitude is in m.
 #[derive(Clone, Copy)]
 struct Condition {
     state: State,
@@ -115,11 +115,12 @@ const VARIABLES: [Variable; 12] = [
     ("altitude, m", [600.0, 607.0], |c, x| c.altitude = x),
 ];
 
-/// The signature of the effect `about` with `values` of its coefficients, on `model`.
+/// Computes the signature of the effect `about` with the coefficients `values`. If `model` already has the effect, the
+/// comparison is with zero coefficients.
 ///
 /// # Errors
-/// The effect is a measurement error or cannot join the model, or the model has no level trim at the airframe's cruise
-/// airspeed.
+/// The effect is a measurement error or cannot be added to the model, or the model has no level trim at the airframe's
+/// cruise airspeed.
 pub fn signature(
     model: &GreyBox,
     about: &Description,
@@ -139,7 +140,7 @@ pub fn signature(
     Ok(Signature { sweeps: sweeps(&models, &trim), manoeuvre: manoeuvre(&models, &trim) })
 }
 
-/// Sets the coefficients of an effect of the model.
+/// Sets the coefficients of the effect `about` in `model`.
 fn set(model: &mut GreyBox, about: &Description, values: &[f64]) {
     for (c, value) in about.coefficients.iter().zip(values) {
         model.set_coefficient(&format!("{}.{}", about.id, c.name), *value);
@@ -147,7 +148,7 @@ fn set(model: &mut GreyBox, about: &Description, values: &[f64]) {
 }
 
 fn sweeps(models: &[GreyBox; 2], trim: &Trim) -> Vec<Pair> {
-    // sideslip (rad), rates (rad/s) and aileron (rad) are not zero: effects of their products also appear
+    // sideslip (rad), rates (rad/s) and aileron (rad) differ from zero, where effects of their products would vanish
     let state = State { beta: 0.07, p: 0.4, q: 0.3, r: 0.3, ..trim.state };
     let controls = Controls { aileron: 0.1, ..trim.controls };
     let from = Condition { state, controls, altitude: ALTITUDE };
@@ -220,8 +221,8 @@ fn command(model: &GreyBox, trim: &Trim, time: f64) -> Command {
     .clamped()
 }
 
-/// The `most` pairs with the largest changes, in descending order. A change is relative to the largest range of the vertical
-/// quantity without the effect.
+/// Selects the `most` pairs with the largest changes and sorts them in descending order. A change is divided by the
+/// largest range that the vertical quantity has without the effect in any pair.
 fn plainest(all: Vec<Pair>, most: usize) -> Vec<Pair> {
     let extent = |values: &[f64]| {
         let fold = |f: fn(f64, f64) -> f64, start| values.iter().copied().fold(start, f);
@@ -251,8 +252,8 @@ mod tests {
     use greylag_physics::{effects, inputs};
     use std::path::Path;
 
-    /// Every effect of the catalogue changes a sweep and the manoeuvre with its example values. An effect of the inputs, such as
-    /// an actuator lag, changes only the manoeuvre.
+    /// With its example values, every effect of the catalogue changes a sweep and the manoeuvre. An effect of the
+    /// inputs, such as an actuator lag, changes only the manoeuvre.
     #[test]
     fn every_effect_leaves_its_signature() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");

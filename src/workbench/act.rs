@@ -342,7 +342,7 @@ impl Bench {
 }
 
 impl Inner {
-    /// The amended model, and the accepted effects that joined it.
+    /// The amended model, and the accepted effects that its fit added.
     fn amended(&self) -> Result<(GreyBox, Vec<String>), WorkbenchError> {
         if self.session.effects.is_empty() {
             return Ok((self.model.clone(), Vec::new()));

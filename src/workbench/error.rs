@@ -96,7 +96,7 @@ pub enum WorkbenchError {
     /// The amended model would overwrite the model from which it was made.
     #[error("{} is the model to start from, which stays as it is; move it out of the session's folder", .0.display())]
     OverModel(PathBuf),
-    /// None of the accepted effects joined the model.
+    /// The fit added none of the accepted effects to the model.
     #[error(
         "no effect was accepted by the data, so there is nothing to save: keep a refused one anyway, or take it back"
     )]

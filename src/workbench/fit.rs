@@ -43,12 +43,12 @@ impl Fitted {
         Some(Fitted { model, story: json(STORY)?, on_fit: json(ON_FIT)? })
     }
 
-    /// Whether none of the accepted effects joined the model.
+    /// Whether the fit added none of the accepted effects, because the data refuse them.
     pub fn all_refused(&self) -> bool {
         self.joined().is_empty()
     }
 
-    /// The effects that joined the model.
+    /// Ids of the effects that the fit added to the model.
     pub fn joined(&self) -> Vec<String> {
         let all = self.story["effects"].as_array().into_iter().flatten();
         let joined = all.filter(|e| e["joined"] == true);

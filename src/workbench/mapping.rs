@@ -57,8 +57,8 @@ impl Bench {
 }
 
 impl Inner {
-    /// Reads the logs again with one more factor. Logs that remain in doubt become unused, unless the user wants such
-    /// logs (`--despite-problems`). The log at `place` gets its default role if it is no longer in doubt.
+    /// Reads the logs again with one more factor. Logs that still have problems become unused, unless the user wants
+    /// such logs (`--despite-problems`). The log at `place` gets its default role if its problems are corrected.
     fn map(&mut self, place: usize, column: &str, scale: f64) -> Result<(), WorkbenchError> {
         let path = self.folder.join(FILE);
         let flight = self.flights.get(place).and_then(|f| f.as_ref().ok());

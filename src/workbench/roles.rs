@@ -25,8 +25,9 @@ pub struct Divided {
 }
 
 impl Inner {
-    /// Adds a log to the session with `role`; `None` selects the default role. The log replaces a log with the same path. A test
-    /// flight that was removed unopened is a test flight again: another role would open it without a record.
+    /// Adds a log to the session with `role`; `None` selects the default role. The log replaces a log with the same
+    /// path. A log that was removed as an unopened test flight becomes a test flight again, because another role
+    /// would open it without a record.
     pub fn take_in(&mut self, entry: LogEntry, role: Option<Role>, loaded: Arc<Loaded>) {
         let file = self.folder.join(&entry.path);
         let before = self.session.logs.iter().position(|l| self.folder.join(&l.path) == file);
@@ -35,7 +36,7 @@ impl Inner {
             (None, Some(place)) => self.session.logs[place].role,
             (None, None) => self.session.usual_role(&entry.name()),
         };
-        // a log in doubt stays unused until the user gives it a role, unless the user wants such logs
+        // a log with problems stays unused until the user gives it a role, unless the user wants such logs
         let refused = loaded.in_doubt() && !self.given.despite_problems;
         let removed = self.session.removed_tests.iter().position(|known| *known == entry.sha256);
         let role = match removed {
@@ -61,7 +62,7 @@ impl Inner {
         }
     }
 
-    /// Keeps the hash of the log at `place`, which leaves the session, if it is a locked test flight.
+    /// Keeps the hash of the log with index `place`, which is about to be removed, if it is a locked test flight.
     pub fn note_removal(&mut self, place: usize) {
         let log = &self.session.logs[place];
         if self.locked(log) && !self.session.removed_tests.contains(&log.sha256) {

@@ -45,7 +45,7 @@ impl Role {
 pub struct LogEntry {
     /// Path of the log; a relative path is relative to the session's folder.
     pub path: PathBuf,
-    /// SHA-256 of its content.
+    /// SHA-256 of the log's content.
     pub sha256: String,
     /// Role of the flight.
     pub role: Role,
@@ -169,7 +169,7 @@ pub struct Session {
     /// The accepted effects, in order.
     #[serde(default)]
     pub effects: Vec<Accepted>,
-    /// Removed effects, of which the last is the first to be accepted again.
+    /// Removed effects, in order of removal. A redo accepts the last of them again.
     #[serde(default)]
     pub undone: Vec<Accepted>,
     /// Openings of the test flights, in order.
@@ -253,15 +253,17 @@ impl Session {
         }
     }
 
-    /// Changes the log that is held out as the last one added to the role Fit, if a log with the role `next` replaces it.
+    /// Prepares for a new log with the role `next`. If this is a hold-out log, the log of `held_out_last` gets the
+    /// role Fit.
     pub fn make_room(&mut self, next: Role) {
         if let (Role::HoldOut, Some(place)) = (next, self.held_out_last()) {
             self.logs[place].role = Role::Fit;
         }
     }
 
-    /// Index of the log that is held out as the last one added, which the next log replaces. It is the only hold-out flight and
-    /// the last of the fit and hold-out flights, and no effect is accepted. `None` otherwise.
+    /// Index of the log that is held out only because it was added last. The next hold-out log replaces it. It is the
+    /// only hold-out flight and the last of the fit and hold-out flights, and no effect is accepted. Otherwise
+    /// `None`.
     pub fn held_out_last(&self) -> Option<usize> {
         let seen = |log: &LogEntry| matches!(log.role, Role::Fit | Role::HoldOut);
         let last = self.logs.iter().rposition(seen)?;

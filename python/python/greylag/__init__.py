@@ -1,11 +1,13 @@
-"""Models, logs and policies of fixed-wing aircraft.
+"""System identification and attitude control of fixed-wing aircraft: models, flight logs and control policies.
 
-- :class:`Model`: rates, steps and flights of thousands of aircraft at once, as numpy arrays.
-- :func:`load`, :func:`compare`, :func:`diagnose`, :func:`amend`: from flight logs to what a model lacks.
-- :func:`logs.mat_to_csv`: a MATLAB file as the CSV that :func:`load` reads.
-- ``Greylag/X8-v0``, ``Greylag/Imagined-v0`` and :class:`ImaginedVectorEnv`: Gymnasium environments with the task of the
+- :class:`Model` computes state derivatives, single steps and simulated flights of thousands of aircraft at once, as numpy
+  arrays.
+- :func:`load` reads a flight log. :func:`compare` computes the errors of models in flights, :func:`diagnose` finds the
+  physical effects that a model lacks, and :func:`amend` adds them and refits the model.
+- :func:`logs.mat_to_csv` converts a MATLAB file to a CSV that :func:`load` reads.
+- ``Greylag/X8-v0``, ``Greylag/Imagined-v0`` and :class:`ImaginedVectorEnv` are Gymnasium environments with the task of the
   Rust policy training. Importing this package registers them.
-- :func:`export_policy`: a policy trained elsewhere as a folder that ``greylag fly --policy`` flies.
+- :func:`export_policy` writes a policy that was trained elsewhere to a folder for ``greylag fly --policy``.
 """
 
 from . import logs

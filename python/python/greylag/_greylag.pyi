@@ -1,4 +1,4 @@
-"""The native part: what the modules of this package are made of."""
+"""Type stubs of the native module, which is written in Rust. The modules of this package use it."""
 
 from collections.abc import Callable, Sequence
 

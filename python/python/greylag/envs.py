@@ -1,16 +1,20 @@
-"""Gymnasium environments: hold an attitude, with task, observation, action and reward of the Rust policy training.
+"""Gymnasium environments with the attitude control task of the Rust policy training.
 
-An episode is 1000 steps of 0.01 s from wings-level flight at the reference airspeed towards one target: roll within ±60°,
-pitch within ±30°, stratified over a 5 × 5 grid of them.
+Task, observation, action and reward are those of the training.
 
-Observation (16, float32): φ, θ, V_a, p, q, r, α, β, the actuators δa, δ̇a, δe, δ̇e, δt, then what is left to the target in
-φ, θ and V_a, each divided by its unit (:data:`OBSERVATION_UNITS`; V_a counts from 16.67 m/s, throttle from one half).
+An episode starts in wings-level flight at the reference airspeed and has at most 1000 steps of 0.01 s. It has one target
+attitude: roll within ±60° and pitch within ±30°. The targets are stratified over a 5 × 5 grid in roll and pitch.
+
+Observation (16, float32): the state φ, θ, V_a, p, q, r, α, β, the actuators δa, δ̇a, δe, δ̇e, δt, then the control errors
+(target minus state) of φ, θ and V_a. Each component is divided by its scale (:data:`OBSERVATION_UNITS`). V_a is relative to
+16.67 m/s, throttle to one half.
 
 Action (3, float32, each −1 to 1): aileron, elevator, thrust; throttle = (thrust + 1) / 2.
 
-Reward: minus the capped errors of eq. (30) of the paper, from 0 (on target) to −1.1 a step. An aircraft that leaves the
-envelope in which a state can be believed ends its episode (``terminated``) and earns −110, the worst for ever at a discount
-of 0.99: without it, ending an episode early would pay. After 1000 steps an episode is ``truncated``.
+Reward: minus the sum of the capped errors, eq. (30) of the paper [GSFM26], from 0 (on target) to −1.1 per step. An episode
+is ``terminated`` when θ, α, β, a body rate or V_a exceeds the limit up to which the simulation is valid. The reward of that
+step is −110, the discounted sum of −1.1 per step for ever (discount factor 0.99). Without it, an early end would avoid the
+cost of the remaining steps. An episode is ``truncated`` after 1000 steps.
 """
 
 from __future__ import annotations
@@ -28,15 +32,15 @@ from . import _greylag
 from .files import EXACT_MODEL, LEARNED_MODEL
 from .model import Model
 
-#: What each number of an observation is divided by, SI units and radians.
+#: Scale by which each component of an observation is divided: rad, m/s, rad/s, and 0 to 1 for the throttle.
 OBSERVATION_UNITS: NDArray[np.float64] = np.array(_greylag.OBSERVATION_UNITS)
-#: Steps of an episode, and their length in s.
+#: Number of steps of an episode, and duration of a step in s.
 STEPS, STEP_S = 1000, 0.01
 _TRUNCATED, _LOST = 1, 2
 
 
 class _AttitudeEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
-    """One aircraft in a world of the native part."""
+    """One aircraft, simulated by the native module."""
 
     metadata = {"render_modes": [], "render_fps": 100}
 
@@ -53,7 +57,11 @@ class _AttitudeEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """The start of an episode with the next target; ``seed`` begins the row of targets anew."""
+        """Starts an episode with the next target. A ``seed`` restarts the sequence of targets.
+
+        Returns:
+            The first observation, and the control errors as ``info``.
+        """
         super().reset(seed=seed)
         if seed is not None or not self._seeded:
             self._world = self._begun(_drawn(self.np_random))
@@ -67,9 +75,9 @@ class _AttitudeEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """One step of 0.01 s; ``info`` holds what is left to the target."""
+        """Makes one step of 0.01 s. ``info`` has the control errors, target minus state, in degrees and m/s."""
         _, reward, ended, seen = self._world.step(np.ascontiguousarray(action, np.float32).reshape(1, 3))
-        # an episode that ended has begun anew already, with the next target
+        # the native module has already restarted an ended episode with the next target
         self._fresh = bool(ended[0])
         return (
             seen[0],
@@ -81,14 +89,15 @@ class _AttitudeEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
 
 class X8Env(_AttitudeEnv):
-    """``Greylag/X8-v0``: the Skywalker X8 flown by JSBSim in this process, in still air."""
+    """``Greylag/X8-v0``: the Skywalker X8 in still air, simulated by JSBSim in this process."""
 
     def __init__(self, corners: float = 0.0, airspeeds: str = "envelope") -> None:
         """
         Args:
-            corners: Share of the targets that lie in the hard corners instead (0 is the paper's).
-            airspeeds: ``"envelope"``: half the targets want another airspeed, as ``greylag train policy`` trains;
-                ``"start"``: all want that of the start, as in the paper.
+            corners: Fraction, 0 to 1, of targets drawn from the hard corners: |roll| 45° to 60° with |pitch| 25° to 30°.
+                The paper has 0.
+            airspeeds: ``"envelope"``: half of the targets have a random airspeed, as in ``greylag train policy``.
+                ``"start"``: all targets have the airspeed of the start, as in the paper.
         """
         self._airframe = Model.load(EXACT_MODEL)
         super().__init__(corners, airspeeds)
@@ -98,7 +107,7 @@ class X8Env(_AttitudeEnv):
 
 
 class ImaginedEnv(_AttitudeEnv):
-    """``Greylag/Imagined-v0``: one aircraft that flies as a model says; the shipped learned model if none is named."""
+    """``Greylag/Imagined-v0``: one aircraft, simulated by a model; by default the shipped learned model."""
 
     def __init__(
         self,
@@ -108,7 +117,7 @@ class ImaginedEnv(_AttitudeEnv):
     ) -> None:
         """
         Args:
-            model: A model or its file; :data:`greylag.EXACT_MODEL` is the simulator's own.
+            model: A model or its file. :data:`greylag.EXACT_MODEL` has the equations of the simulator.
             corners: As for :class:`X8Env`.
             airspeeds: As for :class:`X8Env`.
         """
@@ -120,10 +129,10 @@ class ImaginedEnv(_AttitudeEnv):
 
 
 class ImaginedVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray]):
-    """Many aircraft that fly as a model says, sixteen to an instruction.
+    """Many aircraft, simulated by a model. A SIMD instruction processes sixteen aircraft.
 
-    Each has an episode of its own. One that ends begins anew in the same step (``AutoresetMode.SAME_STEP``): the observation
-    returned is that of the new episode, ``info["final_obs"]`` holds the last of the old one.
+    Each aircraft has its own episode. An episode that ends is restarted in the same step (``AutoresetMode.SAME_STEP``): the
+    returned observation is the first of the new episode, and ``info["final_obs"]`` has the last of the old one.
     """
 
     metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}
@@ -137,7 +146,7 @@ class ImaginedVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
     ) -> None:
         """
         Args:
-            num_envs: Aircraft; multiples of 16 waste nothing.
+            num_envs: Number of aircraft. It is most efficient if it is a multiple of 16.
             model: As for :class:`ImaginedEnv`.
             corners: As for :class:`X8Env`.
             airspeeds: As for :class:`X8Env`.
@@ -156,13 +165,16 @@ class ImaginedVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
 
     @property
     def episodes(self) -> tuple[int, int]:
-        """Episodes begun, and those that ended outside the envelope."""
+        """Number of episodes started, and number of episodes that were ``terminated``."""
         return self._world.episodes
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """The start of new episodes; ``seed`` begins the row of targets anew."""
+        """Restarts all episodes with the next targets, and returns the first observations.
+
+        A ``seed`` restarts the sequence of targets.
+        """
         super().reset(seed=seed)
         if seed is not None or not self._seeded:
             self._world = self._begun(_drawn(self.np_random))
@@ -174,7 +186,7 @@ class ImaginedVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
     def step(
         self, actions: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray, NDArray, NDArray, dict[str, Any]]:
-        """One step of 0.01 s of every aircraft under (num_envs, 3) actions."""
+        """Makes one step of 0.01 s of all aircraft with (num_envs, 3) actions."""
         actions = np.ascontiguousarray(actions, np.float32)
         seen, reward, ended, last = self._world.step(actions)
         info: dict[str, Any] = {}
@@ -188,18 +200,18 @@ class ImaginedVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
 
 
 def _drawn(generator: np.random.Generator) -> int:
-    """A seed for the native part."""
+    """A random seed for the native module."""
     return int(generator.integers(2**63 - 1))
 
 
 def _spaces(world: _greylag.World) -> tuple[gym.spaces.Box, gym.spaces.Box]:
-    """What can be observed while an episode goes on, and what can be done."""
+    """The observation space and the action space of one aircraft."""
     low, high = (np.array(bound, np.float32) for bound in world.bounds)
     return gym.spaces.Box(low, high, dtype=np.float32), gym.spaces.Box(-1.0, 1.0, (3,), np.float32)
 
 
 def _errors(seen: NDArray[np.float32]) -> dict[str, float]:
-    """What is left to the target."""
+    """The control errors, target minus state, of one observation."""
     roll, pitch, airspeed = (seen[13:16] * OBSERVATION_UNITS[13:16]).tolist()
     return {
         "roll_left_deg": float(np.degrees(roll)),
@@ -209,7 +221,7 @@ def _errors(seen: NDArray[np.float32]) -> dict[str, float]:
 
 
 def register() -> None:
-    """Makes the environments known to :func:`gymnasium.make`; importing the package does it."""
+    """Registers the environments for :func:`gymnasium.make`. The import of the package calls it."""
     if "Greylag/X8-v0" in gym.registry:
         return
     gym.register(id="Greylag/X8-v0", entry_point="greylag.envs:X8Env")

@@ -1,4 +1,4 @@
-"""The parameter files that come with Greylag."""
+"""Paths of the parameter files that are shipped with Greylag."""
 
 from __future__ import annotations
 
@@ -8,19 +8,20 @@ from pathlib import Path
 from . import _greylag
 from ._greylag import GreylagError
 
-#: The model that flies by default: learned from flights, starting at an imperfect prior.
+#: The default model: an imperfect prior model, refined from flights.
 LEARNED_MODEL = "params/x8/learned/model.toml"
-#: The simulator's own model of the X8, an oracle: exact in JSBSim.
+#: The model of the X8 with the equations and coefficients of JSBSim: it is exact in that simulator.
 EXACT_MODEL = "params/x8/jsbsim.toml"
 
 
 def shipped(path: str | os.PathLike[str]) -> Path:
-    """``path`` as given, or, of a path below ``params/`` that does not exist, the file that comes with the package.
+    """The path of an existing file for ``path``.
 
-    ``$XDG_CONFIG_HOME/greylag`` and ``/etc/greylag`` come before the package's own copy, as for the program.
+    A path that exists is returned as given. A relative path below ``params/`` is searched in ``$XDG_CONFIG_HOME/greylag``,
+    then in ``/etc/greylag``, then in the package's copy. The program ``greylag`` searches in the same order.
 
     Raises:
-        GreylagError: There is none.
+        GreylagError: The file does not exist in any of these places.
     """
     found = Path(_greylag.shipped(os.fspath(path)))
     if not found.exists():

@@ -1,4 +1,4 @@
-"""MATLAB files as the CSV that ``greylag logs`` reads."""
+"""Converts MATLAB files to the CSV that ``greylag logs`` reads."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-#: Classes that MATLAB stores in a form of its own, with the line that makes a file of them.
+#: Message for a variable of a class that only MATLAB can read, with the MATLAB line that exports it.
 _OPAQUE = (
     "{name} is an object of MATLAB's class {kind}, which nothing but MATLAB reads: in MATLAB, "
     'writetimetable({name}, "log.csv") writes it (writetable for a table, timeseries2timetable before it for a timeseries)'
@@ -19,7 +19,7 @@ _OPAQUE = (
 
 
 class _Opaque:
-    """A variable of a class that only MATLAB reads."""
+    """A variable of the MATLAB class ``kind``, which only MATLAB can read."""
 
     def __init__(self, kind: str) -> None:
         self.kind = kind
@@ -28,18 +28,19 @@ class _Opaque:
 def mat_to_csv(
     path: str | os.PathLike[str], out: str | os.PathLike[str], names: Mapping[str, str] | None = None
 ) -> list[str]:
-    """Write the signals of a MATLAB file to a CSV, one row a sample; return the columns.
+    """Write the signals of a MATLAB file to the CSV ``out``, one row per sample, and return the names of its columns.
 
-    Read are numeric vectors, and structs of them by dotted names (``flight.imu.p``, ``imu[0].p`` for an array of
-    structs). A matrix of N rows is N samples of the columns ``q[0]``, ``q[1]``, … Files of versions 4 to 7 need scipy,
-    those of version 7.3, and other HDF5 files, need h5py.
+    A signal is a numeric vector. A vector in a struct has a dotted name: ``flight.imu.p``, or ``imu[0].p`` in an array of
+    structs. A matrix with N rows has N samples of the signals ``q[0]``, ``q[1]``, … Files of versions 4 to 7 need scipy.
+    Files of version 7.3 and other HDF5 files need h5py.
 
-    ``names`` gives each column of the CSV the name of its signal in the file: ``{"time_s": "flight.t", "roll_rad":
-    "flight.att[0]"}``. Without it all signals that are as long as most of them are written under their own names; a
-    mapping file then names them ``csv.NAME``. What is left out is named in a warning. Nothing is rescaled.
+    ``names`` maps the columns of the CSV to signals: ``{"time_s": "flight.t", "roll_rad": "flight.att[0]"}``. Without
+    ``names``, the most frequent length of the signals is determined, and all signals of this length are written under
+    their own names. A mapping file then refers to them as ``csv.NAME``. A warning lists the variables that are left out.
+    The values are not rescaled.
 
-    Raises ``ValueError`` if a name is not in the file, if signals that are named differ in length, or if there is no
-    signal; ``ImportError`` if scipy or h5py is not installed.
+    Raises ``ValueError`` if a name is not in the file, if the named signals differ in length, or if there is no signal.
+    Raises ``ImportError`` if scipy or h5py is needed and not installed.
     """
     path = os.fspath(path)
     signals: dict[str, np.ndarray] = {}
@@ -60,7 +61,7 @@ def mat_to_csv(
 def _named(
     path: str, signals: dict[str, np.ndarray], left_out: dict[str, str], names: Mapping[str, str]
 ) -> dict[str, np.ndarray]:
-    """The signals that ``names`` asks for, all of one length."""
+    """The columns that ``names`` defines. Their lengths are equal."""
     for name in names.values():
         if name not in signals:
             why = left_out.get(name) or f"it holds {', '.join(sorted(signals))}"
@@ -77,7 +78,10 @@ def _named(
 
 
 def _most(signals: dict[str, np.ndarray], left_out: dict[str, str]) -> dict[str, np.ndarray]:
-    """The signals of the length that most of them have; the longer ones of two."""
+    """The signals of the most frequent length; of two equally frequent lengths, the greater one.
+
+    The other signals are added to ``left_out`` with the reason.
+    """
     counts = Counter(len(values) for values in signals.values())
     length = max(counts, key=lambda n: (counts[n], n))
     for name, values in signals.items():
@@ -87,7 +91,7 @@ def _most(signals: dict[str, np.ndarray], left_out: dict[str, str]) -> dict[str,
 
 
 def _flatten(name: str, value: Any, signals: dict[str, np.ndarray], left_out: dict[str, str]) -> None:
-    """Add the vectors of a variable to ``signals``, with what is none to ``left_out``."""
+    """Add the vectors in a variable to ``signals``, and everything else to ``left_out`` with the reason."""
     if isinstance(value, _Opaque):
         left_out[name] = _OPAQUE.format(name=name, kind=value.kind)
     elif isinstance(value, Mapping):
@@ -110,7 +114,7 @@ def _flatten(name: str, value: Any, signals: dict[str, np.ndarray], left_out: di
 
 
 def _variables(path: str) -> dict[str, Any]:
-    """The variables of a file: arrays, structs as mappings, arrays of structs as lists."""
+    """The variables of a file by name. Structs are mappings, and arrays of structs are lists."""
     with open(path, "rb") as file:
         start = file.read(520)
     if start.startswith(b"\x89HDF\r\n") or start[512:518] == b"\x89HDF\r\n":
@@ -144,7 +148,7 @@ def _mat5(path: str) -> dict[str, Any]:
         return value
 
     def opaque_name(name: str, value: Any) -> str:
-        # scipy has the name of such a variable in its content
+        # scipy stores the name of such a variable in its value
         first = value.reshape(-1)[0].tolist()[0] if isinstance(value, MatlabOpaque) else b""
         return first.decode(errors="replace") if isinstance(first, bytes) and first else name
 
@@ -167,7 +171,7 @@ def _hdf5(path: str) -> dict[str, Any]:
         if kind in ("char", "cell", "function_handle", "struct") or "MATLAB_empty" in item.attrs:
             return None
         value = item[()]
-        # MATLAB counts the dimensions from the other end
+        # MATLAB stores the dimensions in reverse order
         return np.asarray(value).T if kind else np.asarray(value)
 
     with h5py.File(path, "r") as file:

@@ -1,4 +1,4 @@
-"""A model of an aircraft over numpy arrays."""
+"""A model of an aircraft that is evaluated on numpy arrays."""
 
 from __future__ import annotations
 
@@ -11,18 +11,19 @@ from numpy.typing import ArrayLike, NDArray
 from . import _greylag
 from .files import shipped
 
-#: Columns of a table of states, with units: Euler angles ZYX, true airspeed, rates in body axes (FRD), incidence.
+#: Columns of a table of states, with units: roll and pitch (Euler angles ZYX), true airspeed, body rates (FRD), angles of
+#: attack and sideslip.
 STATE_NAMES: tuple[str, ...] = tuple(_greylag.STATE_NAMES)
-#: Columns of a table of controls, with units: deflections that act (elevator positive trailing edge down, rudder positive
-#: trailing edge left) and the throttle's position, 0 to 1.
+#: Columns of a table of controls, with units: actual deflections (elevator positive trailing edge down, rudder positive
+#: trailing edge left) and the throttle position, 0 to 1.
 CONTROL_NAMES: tuple[str, ...] = ("aileron_rad", "elevator_rad", "throttle", "rudder_rad")
 
 
 class Model:
-    """A grey-box model: physical effects with their coefficients, and what was learned beside them.
+    """A grey-box model: physical effects with their coefficients, and optionally a learned residual.
 
-    Every table of states has the columns :data:`STATE_NAMES`, every table of controls the columns :data:`CONTROL_NAMES`;
-    the rudder may be left out. Angles are radians, speeds m/s, body axes FRD.
+    A table of states has the columns :data:`STATE_NAMES`. A table of controls has the columns :data:`CONTROL_NAMES`; the
+    rudder may be omitted and is then 0. Angles are in radians, speeds in m/s, vectors in body axes FRD.
     """
 
     def __init__(self, native: _greylag.Model) -> None:
@@ -30,10 +31,10 @@ class Model:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Model:
-        """Reads a model file (TOML) or a folder that holds ``model.toml``.
+        """Reads a model file (TOML), or ``model.toml`` in a folder.
 
         Raises:
-            GreylagError: The file cannot be read or is no model.
+            GreylagError: The file cannot be read or is not a model.
         """
         found = shipped(path)
         return cls(_greylag.Model.load(str(found / "model.toml" if found.is_dir() else found)))
@@ -45,56 +46,56 @@ class Model:
 
     @property
     def description(self) -> str:
-        """What its file says that it is."""
+        """The description of the model in its file."""
         return self._native.description
 
     @property
     def path(self) -> Path:
-        """The file that it was read from."""
+        """The path of the model file."""
         return Path(self._native.path)
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of the files that it was read from, hexadecimal."""
+        """The SHA-256 of the files that the model was read from, as hexadecimal text."""
         return self._native.sha256
 
     @property
     def airframe(self) -> str:
-        """The aircraft's name."""
+        """The name of the aircraft."""
         return self._native.airframe
 
     @property
     def effects(self) -> list[str]:
-        """Ids of its physical effects."""
+        """The ids of the physical effects in the model."""
         return self._native.effects
 
     @property
     def coefficients(self) -> dict[str, float]:
-        """Its coefficients by full name, ``effect.coefficient``."""
+        """The values of the coefficients, in the units of the model file, by full name ``effect.coefficient``."""
         return dict(self._native.coefficients)
 
     @property
     def altitude_m(self) -> float:
-        """Altitude of its reference condition, m above mean sea level."""
+        """The altitude of the reference condition, m above mean sea level."""
         return self._native.altitude
 
     @property
     def start(self) -> NDArray[np.float64]:
-        """The state in which an episode starts: wings level, no incidence, at the reference airspeed."""
+        """The state at the start of an episode: wings level, α = β = 0, at the reference airspeed."""
         return np.array(self._native.start)
 
     def derivative(
         self, states: ArrayLike, controls: ArrayLike, altitude_m: float | None = None
     ) -> NDArray[np.float64]:
-        """The rate of change of each state, per second, in double precision.
+        """The time derivatives of states, per second, in double precision.
 
         Args:
-            states: (n, 8), or (8,) for one.
-            controls: (n, 3) or (n, 4), or one row for all.
-            altitude_m: Altitude of all; that of the reference condition if left out.
+            states: (n, 8), or (8,) for one aircraft.
+            controls: (n, 3) or (n, 4), or one row for all aircraft.
+            altitude_m: Altitude of all aircraft, by default that of the reference condition.
 
         Returns:
-            As ``states``.
+            An array with the shape of ``states``.
         """
         table, held, one = _tables(states, controls, np.float64)
         rates = self._native.derivative(table, held, self._altitude(altitude_m))
@@ -103,19 +104,20 @@ class Model:
     def step(
         self, states: ArrayLike, controls: ArrayLike, altitude_m: float | None = None
     ) -> NDArray[np.float32]:
-        """Each state 0.01 s later, controls held, in single precision: sixteen aircraft to an instruction.
+        """The states after 0.01 s with constant controls, in single precision.
 
-        The scheme is the model file's ``integrator``. That of JSBSim remembers the last acceleration, of which a single step
-        knows nothing: it starts as an episode does. Use :meth:`rollout` for more than one step. Roll is not wrapped; a state
-        far outside flight may become NaN.
+        The model file selects the integration scheme (``integrator``). The scheme of JSBSim also uses the acceleration of the
+        previous step. A call of this function has no previous step and computes the first step of a flight: use
+        :meth:`rollout` for more than one step. Roll is not wrapped to ±π. A state far outside the flight envelope may become
+        NaN.
 
         Args:
-            states: (n, 8), or (8,) for one. Tables of float32 are not copied.
-            controls: (n, 3) or (n, 4), or one row for all.
-            altitude_m: Altitude of all; that of the reference condition if left out.
+            states: (n, 8), or (8,) for one aircraft. Tables of float32 are not copied.
+            controls: (n, 3) or (n, 4), or one row for all aircraft.
+            altitude_m: Altitude of all aircraft, by default that of the reference condition.
 
         Returns:
-            As ``states``.
+            An array with the shape of ``states``.
         """
         table, held, one = _tables(states, controls, np.float32)
         later = self._native.step(table, held, self._altitude(altitude_m))
@@ -124,15 +126,15 @@ class Model:
     def rollout(
         self, states: ArrayLike, controls: ArrayLike, altitude_m: float | None = None
     ) -> NDArray[np.float32]:
-        """The flights from ``states`` under ``controls``, steps of 0.01 s, in single precision.
+        """Simulates flights from ``states`` with ``controls`` in steps of 0.01 s, in single precision.
 
         Args:
-            states: (n, 8), or (8,) for one.
-            controls: (steps, n, 3) or (steps, n, 4); (steps, 3) or (steps, 4) for all alike.
-            altitude_m: Altitude of all, held; that of the reference condition if left out.
+            states: Initial states, (n, 8), or (8,) for one aircraft.
+            controls: (steps, n, 3) or (steps, n, 4); or (steps, 3) or (steps, 4), equal for all aircraft.
+            altitude_m: Constant altitude of all aircraft, by default that of the reference condition.
 
         Returns:
-            (steps + 1, n, 8), or (steps + 1, 8) for one: the states given, then those after each step.
+            The initial states and the states after each step: (steps + 1, n, 8), or (steps + 1, 8) for one aircraft.
         """
         table = np.asarray(states, np.float32)
         one = table.ndim == 1
@@ -156,7 +158,7 @@ class Model:
 
 
 def _with_rudder(controls: NDArray) -> NDArray:
-    """The controls with a rudder at rest where they have none."""
+    """The controls with four columns. A missing rudder is added as zeros."""
     if controls.shape[-1] == 3:
         return np.concatenate([controls, np.zeros_like(controls[..., :1])], axis=-1)
     if controls.shape[-1] != 4:
@@ -165,14 +167,14 @@ def _with_rudder(controls: NDArray) -> NDArray:
 
 
 def _finite(what: str, table: NDArray) -> NDArray:
-    # a sum is not finite if one of its terms is not, and costs a tenth of looking at each
+    # the sum is not finite if one of its terms is not; it takes a tenth of the time of a test of each term
     if not np.isfinite(table.sum()) and not np.isfinite(table).all():
         raise ValueError(f"{what} hold a number that is not finite at {tuple(np.argwhere(~np.isfinite(table))[0].tolist())}")
     return table
 
 
 def _tables(states: ArrayLike, controls: ArrayLike, kind: type) -> tuple[NDArray, NDArray, bool]:
-    """States and controls as whole tables, and whether the states were a single row."""
+    """States and controls as tables with n rows, and whether ``states`` was a single row."""
     table = np.asarray(states, kind)
     one = table.ndim == 1
     table = np.ascontiguousarray(np.atleast_2d(table))

@@ -1,4 +1,4 @@
-"""Policies: those trained elsewhere as folders that ``greylag fly`` flies, and folders as functions of observations."""
+"""Control policies: exports policies that were trained elsewhere for ``greylag fly``, and evaluates exported policies."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from ._greylag import GreylagError
 from .files import EXACT_MODEL, shipped
 from .model import Model
 
-#: The discount of the task, which planners value plans with.
+#: Discount factor per step of the task. The planning controllers use it with the critics.
 DISCOUNT = 0.99
 
-#: A network: for each layer its weights, (outputs, inputs) as PyTorch's ``Linear`` has them, and its biases.
+#: Layers of a network: for each layer the weights, (outputs, inputs) as in PyTorch's ``Linear``, and the biases.
 Layers = Sequence[tuple[ArrayLike, ArrayLike]]
 
 
 class Policy:
-    """A policy read from its folder."""
+    """A control policy that was read from its folder."""
 
     def __init__(self, native: _greylag.Policy) -> None:
         self._native = native
@@ -35,28 +35,28 @@ class Policy:
         """Reads the policy in ``folder`` for the airframe of ``model``.
 
         Raises:
-            GreylagError: It is no policy, or one of another airframe.
+            GreylagError: The folder holds no policy, or a policy for another airframe.
         """
         aircraft = model if isinstance(model, Model) else Model.load(model)
         return cls(_greylag.Policy.load(str(shipped(folder)), aircraft._native))
 
     @property
     def origin(self) -> dict[str, Any]:
-        """What its files say of where it comes from."""
+        """The origin of the policy from its files: airframe, model, seed, number of training steps."""
         return json.loads(self._native.origin)
 
     @property
     def has_critics(self) -> bool:
-        """Whether planners can value the end of their plans with it."""
+        """Whether the policy has critics. Planning controllers need them for the terminal value of a plan."""
         return self._native.has_critics
 
     @property
     def layers(self) -> list[int]:
-        """Units of each layer of the actor, inputs first."""
+        """The number of units of each layer of the actor, including the input layer."""
         return self._native.sizes
 
     def act(self, observations: ArrayLike) -> NDArray[np.float32]:
-        """The actions, (n, 3), of (n, 16) observations as the environments give them; (3,) of (16,)."""
+        """The actions, (n, 3), for (n, 16) observations of the environments; (3,) for one observation (16,)."""
         seen = np.asarray(observations, np.float32)
         actions = self._native.act(np.ascontiguousarray(np.atleast_2d(seen)))
         return actions[0] if seen.ndim == 1 else actions
@@ -72,29 +72,32 @@ def export_policy(
     steps: int = 0,
     replace: bool = False,
 ) -> Path:
-    """Writes a policy trained elsewhere as a folder for ``greylag fly --policy`` and ``greylag evaluate --policy``.
+    """Writes a policy that was trained elsewhere to a folder for ``greylag fly --policy`` and ``greylag evaluate --policy``.
 
-    The networks that can be exported are dense: 16 inputs (the environments' observation), hidden layers of at most 512
-    units with ReLU, 3 outputs with tanh. TD3, DDPG and SAC of Stable-Baselines3 have them, with their critics where there are
-    two with ReLU; networks with tanh inside, PPO's and A2C's (no tanh at the end), normalised observations
-    (``VecNormalize``) and state-dependent exploration (``use_sde``) are refused.
+    The actor must be a dense network with 16 inputs (the observation of the environments), hidden layers of at most 512
+    units with ReLU, and 3 outputs with tanh. TD3, DDPG and SAC of Stable-Baselines3 have such actors if their activation
+    function is ReLU. Their critics are exported too if there are two. These are refused: networks with tanh in hidden layers,
+    PPO and A2C (no tanh at the output), normalised observations (``VecNormalize``), and state-dependent exploration
+    (``use_sde``).
 
     Args:
-        folder: Where the files go; made if there is none.
-        policy: A model of Stable-Baselines3, or the layers of the actor (see :data:`Layers`), tanh being added at the end.
-        trained_in: The model that it was trained in, or ``"jsbsim"`` for ``Greylag/X8-v0``.
-        critics: The layers of two critics, each from 16 + 3 inputs to 1; taken from a model of Stable-Baselines3. Without
-            critics the controllers `policy`, `cem-policy` and `hybrid-lqi` fly it; `hybrid` and `cem-critic` do not.
-        seed: Seed of the training, for the record.
-        steps: Steps of the training, for the record; those of a model of Stable-Baselines3 are known.
-        replace: Replace a policy in the folder.
+        folder: Folder for the files. It is created if it does not exist.
+        policy: A model of Stable-Baselines3, or the layers of the actor (see :data:`Layers`) without the tanh of the outputs,
+            which is added.
+        trained_in: The model in which the policy was trained, or ``"jsbsim"`` for ``Greylag/X8-v0``.
+        critics: The layers of two critics, each with 16 + 3 inputs and 1 output. By default those of a model of
+            Stable-Baselines3. The controllers `hybrid` and `cem-critic` need critics; `policy`, `cem-policy` and
+            `hybrid-lqi` do not.
+        seed: Seed of the training, which is recorded in the folder. By default that of a model of Stable-Baselines3.
+        steps: Number of training steps, which is recorded in the folder. By default that of a model of Stable-Baselines3.
+        replace: Whether to replace a policy in the folder.
 
     Returns:
         The folder.
 
     Raises:
         GreylagError: The network cannot be exported.
-        FileExistsError: The folder holds a policy.
+        FileExistsError: The folder holds a policy, and ``replace`` is false.
     """
     file = Path(folder) / "actor.safetensors"
     if file.exists() and not replace:
@@ -129,7 +132,7 @@ def export_policy(
 
 
 def _arrays(layers: Layers) -> list[tuple[NDArray[np.float32], NDArray[np.float32]]]:
-    """The layers as the native part takes them."""
+    """The layers as float32 arrays, as the native module expects them."""
     return [(np.array(weights, np.float32, order="C"), np.array(bias, np.float32)) for weights, bias in layers]
 
 
@@ -141,7 +144,7 @@ def _refuse(what: str) -> GreylagError:
 
 
 def _of_stable_baselines3(algorithm: Any) -> tuple[Layers, tuple[Layers, Layers] | None]:
-    """Actor and critics of a model of Stable-Baselines3."""
+    """The layers of the actor and of the critics of a Stable-Baselines3 model. The critics are ``None`` unless there are two."""
     actor = getattr(algorithm.policy, "actor", None)
     if actor is None or not hasattr(actor, "mu"):
         raise _refuse(f"{type(algorithm).__name__} has no deterministic actor that ends in tanh")
@@ -156,7 +159,8 @@ def _of_stable_baselines3(algorithm: Any) -> tuple[Layers, tuple[Layers, Layers]
         raise _refuse("it explores by its state (use_sde)")
     if type(actor.features_extractor).__name__ != "FlattenExtractor":
         raise _refuse(f"its observations pass a {type(actor.features_extractor).__name__}")
-    # SAC's mean is a layer of its own after the shared ones, and squashed by tanh; TD3's is the whole network
+    # in SAC, `mu` is the last layer after `latent_pi`, and tanh is applied to its output;
+    # in TD3, `mu` is the whole network with tanh
     shared = getattr(actor, "latent_pi", None)
     modules = [*actor.mu] if shared is None else [*shared, actor.mu]
     if shared is None:
@@ -167,7 +171,7 @@ def _of_stable_baselines3(algorithm: Any) -> tuple[Layers, tuple[Layers, Layers]
 
 
 def _critics(algorithm: Any) -> tuple[Layers, Layers] | None:
-    """Its two critics; ``None`` where it has another number, or features of their own that are not observations."""
+    """The layers of the two critics; ``None`` if the number of critics is not two."""
     networks = getattr(getattr(algorithm, "critic", None), "q_networks", [])
     if len(networks) != 2:
         return None
@@ -175,7 +179,7 @@ def _critics(algorithm: Any) -> tuple[Layers, Layers] | None:
 
 
 def _layers(modules: Sequence[Any], of: str) -> Layers:
-    """Weights and biases of ``Linear`` modules with ReLU between them."""
+    """The weights and biases of ``Linear`` modules with ReLU between them. Other modules are refused."""
     names = [type(module).__name__ for module in modules]
     if names[::2] != ["Linear"] * len(names[::2]) or names[1::2] != ["ReLU"] * len(names[1::2]) or len(names) % 2 == 0:
         raise _refuse(f"its {of} is made of {', '.join(names)}")

@@ -1,4 +1,4 @@
-"""What the functions on logs find, as plain classes; what is a table has a ``frame()``."""
+"""Results of the functions on flight logs. ``frame()`` returns a result as a pandas table."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _T = TypeVar("_T")
 
 
 def _read(kind: type[_T], found: dict[str, Any], /, **more: Any) -> _T:
-    """An instance of the fields that were found; a number that cannot be given (``null``) is NaN."""
+    """An instance of ``kind`` from the fields of a JSON document. A number that does not exist (``null``) is NaN."""
     given = {f.name: found[f.name] for f in fields(kind) if f.name in found and f.name not in more}  # type: ignore[arg-type]
     for f in fields(kind):  # type: ignore[arg-type]
         if f.type == "float" and f.name in given and given[f.name] is None:
@@ -27,7 +27,7 @@ def _read(kind: type[_T], found: dict[str, Any], /, **more: Any) -> _T:
 
 
 def _interval(found: list[float | None]) -> tuple[float, float]:
-    """The ends of an interval; an end that cannot be given (``null``) is NaN."""
+    """The ends of an interval in a JSON document. An end that does not exist (``null``) is NaN."""
     low, high = (float("nan") if end is None else end for end in found)
     return low, high
 
@@ -40,29 +40,29 @@ def _table(rows: list[dict[str, Any]]) -> pd.DataFrame:
 
 @dataclass(frozen=True)
 class Log:
-    """A flight log as one table: SI units, radians, body axes FRD, earth axes NED; a missing value is NaN."""
+    """A flight log as a table: SI units, radians, body axes FRD, earth axes NED. A missing value is NaN."""
 
     name: str
-    """The file's name."""
+    """Name of the file."""
     format: str
-    """The file's format."""
+    """Name of the file's format, such as ``CSV table``."""
     notes: list[str]
-    """What was assumed, derived or found odd while reading."""
+    """Assumptions, derived columns and anomalies that the reader reports."""
     columns: dict[str, NDArray[np.float64]]
-    """The columns that hold something, each with a unit at the end of its name."""
+    """Columns with at least one value. The unit is at the end of the name."""
 
     @property
     def states(self) -> NDArray[np.float64]:
-        """The states, (n, 8), for :class:`greylag.Model`; NaN where a sensor is missing."""
+        """The states, (n, 8), for :class:`greylag.Model`. A state that was not logged is NaN."""
         return self._matrix(STATE_NAMES)
 
     @property
     def controls(self) -> NDArray[np.float64]:
-        """The deflections with the throttle, (n, 4), for :class:`greylag.Model`; NaN where they were not logged."""
+        """The controls, (n, 4), for :class:`greylag.Model`. A control that was not logged is NaN."""
         return self._matrix(("aileron_rad", "elevator_rad", "throttle", "rudder_rad"))
 
     def frame(self) -> pd.DataFrame:
-        """The table, indexed by time in s."""
+        """The columns as a table, with the time in s as index."""
         return _table([]).assign(**self.columns).set_index("time_s")
 
     def _matrix(self, names: tuple[str, ...]) -> NDArray[np.float64]:
@@ -75,18 +75,18 @@ class Log:
 
 @dataclass(frozen=True)
 class HorizonScore:
-    """Free-run error at one time after the start, over all starts."""
+    """Free-run errors at one horizon (time after the start of a run), over all runs."""
 
     horizon_s: float
-    """Time after the start, s."""
+    """Time after the start of a run, s."""
     runs: int
-    """Runs that the flights are long enough for."""
+    """Number of runs that reach the horizon, including diverged runs."""
     diverged: int
-    """Those of them that diverged by then."""
+    """Number of these runs that have diverged by then."""
     rmse_scaled: float
-    """Root mean square of the error divided by the paper's scale x_c."""
+    """Root mean square, over runs and states, of error / x_c, where x_c is the reference scale of a state in [GSFM26]."""
     states: dict[str, float] = field(default_factory=dict)
-    """Root mean square error of each state, in its unit."""
+    """Root mean square error of each state over the runs that did not diverge, in the unit of the state."""
 
     @classmethod
     def _of(cls, document: dict[str, Any]) -> HorizonScore:
@@ -106,50 +106,50 @@ def _score_row(score: HorizonScore) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Channel:
-    """One channel of a model over all flights: a force, a moment, or the rate of airspeed or incidence."""
+    """Errors of one model in one channel over all flights: a force, a moment, or the rate of V, α or β."""
 
     name: str
-    """Its name."""
+    """Name of the channel, such as ``lift``."""
     unit: str
-    """Its unit."""
+    """Unit of the channel."""
     measured_sd: float
-    """Standard deviation of what was measured, in ``unit``."""
+    """Standard deviation of the measured channel, in ``unit``."""
     residual_rms: float
-    """Root mean square of measured minus model, in ``unit``."""
+    """Root mean square of the residual (measured minus model), in ``unit``."""
     noise_sd: float
-    """Part of it that the sensors' noise accounts for, in ``unit``."""
+    """Standard deviation of the residual due to sensor noise, in ``unit``."""
     unexplained_fraction: float
-    """Share of the variance beyond noise that the model leaves; NaN where the flights do not move the channel."""
+    """Residual variance divided by measured variance, both less noise. NaN if the channel hardly varies beyond noise."""
     worst_regime: str
-    """Where the model is worst, in one sentence."""
+    """One sentence on the flight regime with the largest error."""
 
 
 @dataclass(frozen=True)
 class ModelResult:
-    """One model against all flights."""
+    """Errors of one model over all flights."""
 
     name: str
-    """The model."""
+    """Name of the model."""
     sentences: list[str]
-    """What it finds in plain words, the leading sentences first."""
+    """Findings on the model in sentences, the most important first."""
     free_run: list[HorizonScore]
-    """Free-run error by horizon."""
+    """Free-run errors, one entry for each horizon."""
     channels: list[Channel]
-    """Channel by channel."""
+    """Errors in forces, moments and rates, one entry for each channel."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Models against flights: what ``greylag compare`` finds."""
+    """Errors of models over flights: the result of ``greylag compare``."""
 
     models: list[ModelResult]
-    """The models, in the order given."""
+    """Result of each model, in the order of the call."""
     forecasts: dict[str, list[HorizonScore]]
-    """What a model has to beat: free runs by forecasts that know no aerodynamics, by name."""
+    """Free-run errors of baseline forecasts without aerodynamics, by name of the forecast."""
     notes: list[str]
-    """What the reader must know: what was skipped, assumed or lost."""
+    """Notes on skipped flights, assumptions and lost accuracy."""
     document: dict[str, Any]
-    """Everything that was found, as in ``greylag compare --json``."""
+    """The whole result, as in ``greylag compare --json``."""
 
     @classmethod
     def _of(cls, document: dict[str, Any]) -> Comparison:
@@ -163,16 +163,16 @@ class Comparison:
 
     @property
     def sentences(self) -> list[str]:
-        """The finding of the first model in plain words."""
+        """The findings on the first model in sentences."""
         return self.models[0].sentences
 
     def frame(self) -> pd.DataFrame:
-        """Free-run errors, a row a model and horizon, then the forecasts'; states in their units."""
+        """Free-run errors, one row for each model or forecast and horizon. Errors of states are in the units of the states."""
         runs = [(m.name, m.free_run) for m in self.models] + [*self.forecasts.items()]
         return _table([{"model": name, **_score_row(s)} for name, scores in runs for s in scores])
 
     def channels_frame(self) -> pd.DataFrame:
-        """What each model leaves unexplained, a row a model and channel."""
+        """Errors in channels, one row for each model and channel."""
         return _table([{"model": m.name, **vars(c)} for m in self.models for c in m.channels])
 
 
@@ -181,57 +181,59 @@ class Parameter:
     """A fitted parameter of an effect."""
 
     name: str
-    """Its name in model files."""
+    """Name in model files."""
     value: float
-    """Its value."""
+    """Estimate, in the unit that ``unit`` names."""
     ci95: tuple[float, float]
-    """Its 95 % interval."""
+    """95 % confidence interval of ``value``."""
     unit: str
-    """What it is, with its unit."""
+    """Unit of ``value``, with the meaning of the parameter."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect that the model may lack."""
+    """A physical effect that the model may lack, with its evidence."""
 
     id: str
-    """Its id in the catalogue."""
+    """Id of the effect in the catalogue."""
     description: str
-    """What it is, in one sentence."""
+    """Description of the effect, in one sentence."""
     asserted: bool
-    """Whether the data say that it is missing."""
+    """Whether the diagnosis asserts that the model lacks the effect."""
     evidence: float
-    """Its evidence."""
+    """The smaller of the penalised gain and the block-robust Wald statistic. It is compared with ``threshold``."""
     threshold: float
-    """What chance reaches in flights that lack nothing."""
+    """Evidence that chance reaches in simulated flights without a missing effect."""
     parameters: list[Parameter]
-    """Its parameters, fitted together with the model's own."""
+    """Parameters of the effect, fitted together with the model's own coefficients."""
     channels: list[str]
-    """Channels in which it takes part of the residual, the largest first."""
+    """Channels (D, L, Y, l, m, n) whose residual the effect reduces, the largest reduction first."""
     indistinguishable_from: list[str]
-    """Ids that these flights cannot tell from it."""
+    """Ids of effects that these flights cannot distinguish from this effect."""
     heldout_error_reduction: float
-    """Share by which it lowers the error of stretches that the fit did not see."""
+    """Relative reduction of the error on segments that the fit did not use, 0 to 1; NaN if it was not computed."""
     refused: list[str]
-    """Why it is not asserted although its evidence exceeds the threshold."""
+    """Reasons why the effect is not asserted although its evidence exceeds the threshold."""
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Which physical effect a model lacks: what ``greylag diagnose`` finds."""
+    """Physical effects that a model lacks: the result of ``greylag diagnose``."""
 
     model: str
-    """The model's name."""
+    """Name of the model."""
     verdict: str
-    """``effect``, ``adequate``, ``unexplained``, or ``unknown`` if the flights allow no verdict."""
+    """Verdict on the model: ``effect`` (at least one effect is asserted), ``adequate`` (no effect is missing),
+    ``unexplained`` (something is missing that no effect of the catalogue explains), or ``unknown`` (the flights allow no
+    verdict)."""
     sentences: list[str]
-    """The answer in plain words, the most important first."""
+    """Answer in sentences, the most important first."""
     effects: list[Candidate]
-    """Every candidate: asserted ones first, then by evidence."""
+    """All candidates: first the asserted ones, then the others in descending order of evidence."""
     notes: list[str]
-    """What the reader must know besides."""
+    """Further notes for the reader."""
     document: dict[str, Any]
-    """Everything that was found, as in ``greylag diagnose --json``."""
+    """The whole result, as in ``greylag diagnose --json``."""
 
     @classmethod
     def _of(cls, document: dict[str, Any]) -> Diagnosis:
@@ -244,11 +246,11 @@ class Diagnosis:
 
     @property
     def asserted(self) -> list[Candidate]:
-        """The effects that the data say are missing."""
+        """The candidates that are asserted."""
         return [effect for effect in self.effects if effect.asserted]
 
     def frame(self) -> pd.DataFrame:
-        """The candidates, a row each, with their first parameter."""
+        """The candidates, one row each, with name and value of their first parameter."""
 
         def row(effect: Candidate) -> dict[str, Any]:
             of = {k: v for k, v in vars(effect).items() if k not in ("parameters", "description")}
@@ -263,45 +265,48 @@ class FittedParameter:
     """A coefficient before and after a fit."""
 
     name: str
-    """``effect.coefficient``, as in the model file."""
+    """Name, ``effect.coefficient``, as in the model file."""
     added: bool
-    """Whether it belongs to an effect that was added."""
+    """Whether the coefficient belongs to an added effect."""
     prior: float
-    """Value before the fit."""
+    """Value before the fit, in the unit of the model file."""
     value: float
-    """The fitted value."""
+    """Estimate, in the unit of the model file."""
     sd: float
-    """Its standard deviation."""
+    """Standard deviation of ``value``."""
     ci95: tuple[float, float]
-    """Its 95 % interval."""
+    """95 % confidence interval of ``value``."""
     at_bound: bool
-    """Whether it stands at a bound of what is physically possible."""
+    """Whether the estimate is at a bound of the physically possible range."""
 
 
 @dataclass(frozen=True)
 class Amendment:
-    """A model refitted to flights, effects added: what ``greylag amend`` does."""
+    """A model refitted to flights, with added effects: the result of ``greylag amend``.
+
+    Free-run errors are those on the held-out flights.
+    """
 
     path: Path
-    """The amended model's file."""
+    """File of the amended model."""
     sentences: list[str]
-    """The story in plain words."""
+    """Sentences on conventions, on refused effects and on an unmodelled rudder."""
     added: list[str]
-    """Ids of the effects that the amended model has more."""
+    """Ids of the added effects."""
     refused: dict[str, list[str]]
-    """Effects that the data refuse, with why."""
+    """Reasons to reject an effect, by id of the effect."""
     parameters: list[FittedParameter]
-    """Every coefficient that was free."""
+    """All free coefficients of the amended model, including those of added effects."""
     given: list[HorizonScore]
-    """Free-run error on held-out flights of the model as given,"""
+    """Free-run errors of the model as given, one entry for each horizon."""
     before: list[HorizonScore]
-    """with its coefficients tuned,"""
+    """Free-run errors of the model with tuned coefficients and without added effects."""
     after: list[HorizonScore]
-    """with the effects."""
+    """Free-run errors of the amended model."""
     notes: list[str]
-    """What the reader must know besides."""
+    """Further notes for the reader."""
     document: dict[str, Any]
-    """Everything that was found, as in ``amend.json``."""
+    """The whole result, as in ``amend.json``."""
 
     @classmethod
     def _of(cls, document: dict[str, Any], path: Path) -> Amendment:
@@ -326,10 +331,13 @@ class Amendment:
         return Model.load(self.path)
 
     def frame(self) -> pd.DataFrame:
-        """Free-run errors on flights that the fit did not see: as given, tuned, amended; states in their units."""
+        """Free-run errors of the model as given, tuned and amended, one row for each horizon.
+
+        Errors of states are in the units of the states.
+        """
         stages = {"given": self.given, "tuned": self.before, "amended": self.after}
         return _table([{"model": name, **_score_row(s)} for name, all in stages.items() for s in all])
 
     def parameters_frame(self) -> pd.DataFrame:
-        """The coefficients, a row each."""
+        """The free coefficients, one row each."""
         return _table([vars(p) for p in self.parameters])

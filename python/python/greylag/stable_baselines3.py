@@ -1,4 +1,4 @@
-"""The imagined aircraft as a vectorised environment of Stable-Baselines3, which has a convention of its own."""
+"""Adapter of :class:`greylag.ImaginedVectorEnv` to the vectorised environments of Stable-Baselines3."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ class ImaginedVecEnv(VecEnv):
         super().__init__(num_envs, self.envs.single_observation_space, self.envs.single_action_space)
 
     def reset(self) -> np.ndarray:
-        """The start of new episodes."""
+        """Restarts all episodes and returns the first observations."""
         seen, _ = self.envs.reset(seed=self._seeds[0])
         self._reset_seeds()
         return seen
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Keeps the actions for :meth:`step_wait`."""
+        """Stores the actions for :meth:`step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """One step of every aircraft."""
+        """Makes one step of all aircraft with the stored actions."""
         seen, reward, terminated, truncated, info = self.envs.step(self._actions)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         done = terminated | truncated
@@ -52,22 +52,22 @@ class ImaginedVecEnv(VecEnv):
         return seen, reward, done, infos
 
     def close(self) -> None:
-        """Gives nothing back: there is nothing."""
+        """Does nothing, because the environment holds no resources to release."""
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """The attribute of the environments, which share it."""
+        """The value of an attribute, once for each index. All aircraft share the attribute."""
         return [getattr(self.envs, attr_name)] * len(self._chosen(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Sets the attribute of the environments, which share it."""
+        """Sets an attribute. All aircraft share it, so ``indices`` has no effect."""
         setattr(self.envs, attr_name, value)
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Calls the method of the environments, which share it, once."""
+        """Calls a method once for all aircraft and returns its result once for each index."""
         return [getattr(self.envs, method_name)(*args, **kwargs)] * len(self._chosen(indices))
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """None is."""
+        """Always false: no environment is wrapped."""
         return [False] * len(self._chosen(indices))
 
     def _chosen(self, indices: Any) -> Sequence[int]:

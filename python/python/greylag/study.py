@@ -1,6 +1,7 @@
-"""From flight logs to what a model lacks: the functions of ``greylag compare``, ``diagnose`` and ``amend``.
+"""Functions on flight logs: :func:`load`, and the commands ``greylag compare``, ``diagnose`` and ``amend``.
 
-They give up the interpreter's lock. Ctrl-C ends them at their next stage, as does whatever ``progress`` raises.
+The functions release the interpreter's lock. Ctrl-C, or an exception that ``progress`` raises, cancels them at their next
+stage.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from .results import Amendment, Comparison, Diagnosis, Log
 
 _Path = str | os.PathLike[str]
 _Model = Model | _Path
-#: Called with what is being done, in words, and the share of the whole that is done, 0 to 1.
+#: Callback with a description of the present stage and the completed fraction of the work, 0 to 1.
 Progress = Callable[[str, float], object]
 
 
@@ -40,16 +41,16 @@ class _Wanted:
 def load(
     log: _Path, *, mapping: _Path | None = None, lenient: bool = False, despite_problems: bool = False
 ) -> Log:
-    """Reads a flight log: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, told apart by content.
+    """Reads a flight log: CSV, PX4 ULog, ArduPilot .bin, MAVLink .tlog or ROS 2 .mcap. The content decides the format.
 
     Args:
         log: The file.
-        mapping: A TOML file that says where columns come from.
-        lenient: Read logs in which more than 5 % of the rows are unusable.
-        despite_problems: Use logs in which wrong units, signs or axes were found.
+        mapping: A TOML file that assigns fields of the log to columns.
+        lenient: Whether to accept logs in which more than 5 % of the rows are unusable.
+        despite_problems: Whether to accept logs in which wrong units, signs or axes were found.
 
     Raises:
-        GreylagError: The file is no log, lacks a needed column, or holds what makes figures wrong.
+        GreylagError: The file is not a log, lacks a required column, or has wrong units, signs or axes.
     """
     reading = _reading(mapping, lenient, despite_problems)
     name, kind, notes, columns = _greylag.load(os.fspath(log), reading)
@@ -67,15 +68,15 @@ def compare(
     despite_problems: bool = False,
     progress: Progress | None = None,
 ) -> Comparison:
-    """Where models fail against flight logs.
+    """Computes the errors of models over flights: in free runs, and in forces, moments and rates.
 
     Args:
-        models: One model or several: :class:`Model` or files. The first gives gravity and actuators for the reconstruction.
-        logs: The files of the flights.
+        models: One or several models, or their files. The flight path reconstruction uses gravity and actuators of the first.
+        logs: The log files of the flights.
         horizons_s: Horizons of the free runs, s.
         seed: Seed of the bootstrap intervals.
         mapping, lenient, despite_problems: As for :func:`load`.
-        progress: Hears how far it is.
+        progress: Callback for the progress.
 
     Raises:
         GreylagError: A log or a model cannot be used.
@@ -103,19 +104,20 @@ def diagnose(
     despite_problems: bool = False,
     progress: Progress | None = None,
 ) -> Diagnosis:
-    """Which physical effect a model lacks, if any.
+    """Finds the physical effects that a model lacks.
 
     Args:
         model: The model or its file.
-        logs: The files of the flights.
-        nulls: Bootstrap draws under the null hypothesis (no effect missing) that set the thresholds; 20 or more.
-        without: Ids left out of the catalogue.
-        seed: Seed of everything that is drawn.
+        logs: The log files of the flights.
+        nulls: Number of bootstrap draws under the null hypothesis (no effect is missing), at least 20. They determine the
+            thresholds of the evidence.
+        without: Ids of effects that are not considered.
+        seed: Seed of all random draws.
         mapping, lenient, despite_problems: As for :func:`load`.
-        progress: Hears how far it is.
+        progress: Callback for the progress.
 
     Raises:
-        GreylagError: A log or the model cannot be used, or too little was flown.
+        GreylagError: A log or the model cannot be used, or the flights are too short.
     """
     if nulls < 20:
         raise ValueError(f"nulls is {nulls}; thresholds need 20 or more")
@@ -147,26 +149,26 @@ def amend(
     despite_problems: bool = False,
     progress: Progress | None = None,
 ) -> Amendment:
-    """A model refitted to flights, missing effects added; written to the folder ``out``.
+    """Adds missing effects to a model, refits it to flights and writes it to the folder ``out``.
 
     Args:
-        model: The model to start from, or its file; it stays as it is.
-        logs: The files of the flights to fit to.
-        out: Folder for ``model.toml``, the airframe and ``amend.json``; made if there is none.
-        effects: What to add: the asserted effects of a :class:`Diagnosis`, ids of the catalogue, ``[]`` to fit the
-            model's own coefficients only; left out, the effects that a diagnosis of these logs asserts.
-        hold_out: Files to judge by, which the fit does not see. Left out, the last of ``logs``; of a single one, its last
-            third.
-        conventions: Also try the model's other conventions (integrator, axes of the forces, the standard atmosphere).
-        from_scratch: The model holds guesses: fit its coefficients without their priors.
-        keep_refused: Write effects into the model that the data refuse.
-        replace: Replace an amended model in ``out``.
+        model: The model to start from, or its file. It is not changed.
+        logs: The log files of the flights for the fit.
+        out: Folder for ``model.toml``, the airframe and ``amend.json``. It is created if it does not exist.
+        effects: The effects to add: a :class:`Diagnosis` (its asserted effects) or ids of the catalogue. ``[]`` adds none and
+            fits the model's own coefficients. By default the effects that a diagnosis of these logs asserts.
+        hold_out: Log files for validation, which the fit does not use. By default the last of ``logs``, or the last third of
+            a single log.
+        conventions: Whether to try other modelling conventions too (integrator, force axes, standard atmosphere).
+        from_scratch: Whether to fit the coefficients without their priors, for a model whose coefficients are guesses.
+        keep_refused: Whether to add effects that the data refuse, too.
+        replace: Whether to replace an amended model in ``out``.
         mapping, lenient, despite_problems: As for :func:`load`.
-        progress: Hears how far it is.
+        progress: Callback for the progress.
 
     Raises:
         GreylagError: A log or the model cannot be used, or no effect was accepted.
-        FileExistsError: ``out`` holds a model.
+        FileExistsError: ``out`` holds a model, and ``replace`` is false.
     """
     start, folder = _model(model), Path(out)
     file = folder / "model.toml"
@@ -189,7 +191,7 @@ def amend(
 
 
 def _checked(diagnosis: Diagnosis, model: Model) -> None:
-    """Refuses a diagnosis that has nothing to add, or is of another model."""
+    """Raises an error if the diagnosis is of another model or asserts no effect."""
     if diagnosis.model != model.name:
         raise GreylagError(f"the diagnosis is of model {diagnosis.model}, not of {model.name}; diagnose this one")
     if not diagnosis.asserted:
@@ -197,7 +199,7 @@ def _checked(diagnosis: Diagnosis, model: Model) -> None:
 
 
 def _effects(effects: Diagnosis | Sequence[str] | None) -> list[tuple[str, dict[str, float]]] | None:
-    """The effects to add with the values near which to search."""
+    """The effects to add, with start values of their parameters. ``None`` adds those that a diagnosis asserts."""
     if effects is None:
         return None
     if isinstance(effects, Diagnosis):

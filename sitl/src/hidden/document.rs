@@ -151,7 +151,7 @@ impl<'a> Document<'a> {
         Ok(())
     }
 
-    /// Passes both deflections through a further flight-control component before they act.
+    /// Passes the deflections of aileron and elevator through a further flight-control component before they act.
     pub(super) fn pass_deflections(&mut self, component: &str, settings: &str) {
         for surface in SURFACES {
             let (input, name) = (
@@ -165,7 +165,8 @@ impl<'a> Document<'a> {
         self.passed += 1;
     }
 
-    /// Adds a filter of the expression `input` with the output property `output`; `time_s` is its time constant or delay, s.
+    /// Adds a filter of `kind` from the expression `input` to the property `output`. `time_s` is its time constant or
+    /// delay, s.
     pub(super) fn filter(
         &mut self,
         output: &str,
@@ -206,12 +207,12 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// Multiplies both deflections by `factor` where they act.
+    /// Multiplies the deflections of aileron and elevator by `factor` where they act.
     pub(super) fn scale_deflections(&mut self, factor: String) {
         self.factors.push(factor);
     }
 
-    /// Makes deflections act as δ (1 + `cubic` δ²) in roll and in pitch.
+    /// Makes each deflection δ act as δ (1 + `cubic` δ²) in roll and in pitch.
     pub(super) fn saturate(&mut self, cubic: f64) {
         self.saturation = Some(cubic);
     }

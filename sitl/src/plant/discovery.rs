@@ -26,7 +26,8 @@ use roles::{Tried, choose};
 const FRAMES: usize = 2000;
 /// Frames without movement after which the surfaces count as at rest; no actuator delay may be longer.
 const AT_REST: usize = 60;
-/// Movement per frame, relative to the largest so far (at least to 1), below which a surface counts as at rest.
+/// Movement per frame below which a surface counts as at rest, as a fraction of the largest movement so far, or of 1 if
+/// that is larger.
 const STILL: f64 = 1e-9;
 /// Airspeed at which commands are tried, ft/s. Its only purpose is a nonzero dynamic pressure.
 const AIRSPEED_FPS: f64 = 150.0;
@@ -219,7 +220,7 @@ impl Bench {
         Ok(most)
     }
 
-    /// The command that moves the throttle; `None` if the default command moves it, or if none does.
+    /// The command that moves the throttle; `None` if the default command or no command moves it.
     fn throttle(&mut self, names: &Names) -> Result<Option<String>, PlantError> {
         let Some(place) = look(&self.fdm, "fcs/throttle-pos-norm") else { return Ok(None) };
         let usual = super::options::THROTTLE_COMMAND.to_owned();
@@ -239,8 +240,9 @@ impl Bench {
 
 /// Loads the aircraft of `options` with its named or default properties.
 ///
-/// If defaults are missing, move no surface or deflect one to the wrong side, the properties that `discover` finds replace them
-/// and are returned with the plant. Properties named in `options` are never replaced.
+/// If default properties are missing, move no surface, or deflect a surface to the wrong side, they are replaced by the
+/// properties that `discover` finds. The plant is then returned with these. Properties named in `options` are never
+/// replaced.
 ///
 /// # Errors
 /// If the aircraft cannot be loaded, or no command steers it.

@@ -49,7 +49,7 @@ impl Linked {
         Linked::find(fdm, "", text).ok()
     }
 
-    /// Adds each part's share of `value` to the list of values to write.
+    /// Adds `value` times the factor of each part to the values that are to be written.
     pub fn add(&self, value: f64, written: &mut Vec<(NodeId, f64)>) {
         for (node, factor) in &self.0 {
             match written.iter_mut().find(|(known, _)| known == node) {

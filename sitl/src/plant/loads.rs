@@ -99,7 +99,8 @@ impl Plant {
         })
     }
 
-    /// Result of `work` while the aircraft is held in `start`: only its systems and engines run.
+    /// Runs `work` while the aircraft is held in `start`, where only its systems and engines run, and returns its
+    /// result.
     fn held_in<T>(
         &mut self,
         start: &Start,
@@ -109,7 +110,8 @@ impl Plant {
         self.held(work)
     }
 
-    /// Result of `work` while the integrators of the state are off: only systems and engines run.
+    /// Runs `work` while the integrators of the state are off, so that only systems and engines run, and returns its
+    /// result.
     pub(super) fn held<T>(
         &mut self,
         work: impl FnOnce(&mut Plant) -> Result<T, PlantError>,

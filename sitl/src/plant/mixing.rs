@@ -1,7 +1,7 @@
 //! Mixer of an aircraft whose surfaces and motors are commanded one by one.
 //!
-//! The shim shares no code with the companion, which makes each a check of the other. This mixer therefore computes the controls
-//! from the positions by least squares (normal equations).
+//! The shim shares no code with the companion, which makes each a check of the other. This mixer has its own method: it
+//! computes the controls from the positions by least squares (normal equations).
 
 use super::{Inputs, Properties};
 

@@ -88,8 +88,8 @@ impl Nodes {
         self.steering.is_glider()
     }
 
-    /// Starts every engine that can be off. Returns the index of the first that does not run after the start.
-    /// JSBSim starts engines at full power; they then follow the throttle.
+    /// Starts every engine that can be off. Returns the index of the first engine that does not run after the start;
+    /// `None` if all run. JSBSim starts engines at full power; they then follow the throttle.
     pub(super) fn start_engines(&self, fdm: &mut Fdm, step_s: f64) -> Result<Option<usize>, Error> {
         if self.running.is_empty() {
             return Ok(None);
@@ -183,8 +183,8 @@ impl Nodes {
         let [north, east, _] = wind;
         if north == 0.0 {
             // For a wind without a north component, JSBSim keeps the previous direction
-            // (findings/jsbsim-wind-direction.sh). Here it is that of a rounding error of the initial condition. The
-            // turbulence depends on the direction.
+            // (findings/jsbsim-wind-direction.sh). Here that would be the direction of a rounding error of the initial
+            // condition. The turbulence depends on the direction.
             fdm.set_property("atmosphere/psiw-rad", east.atan2(0.0))?;
         }
         if wind != [0.0; 3] {

@@ -1,8 +1,8 @@
 //! Spins up propellers that are at rest after the start of their engines.
 //!
-//! JSBSim's electric engine is a source of constant power: its torque is the power divided by the propeller's speed, of
-//! which JSBSim takes at least 1 rad/s. The first frame therefore adds P·dt/J to the speed of a propeller at rest. For
-//! a model aircraft in steps of 10 ms this is 130,000 rpm, and the state is NaN 0.1 s later
+//! JSBSim's electric engine is a source of constant power: its torque is the power divided by the propeller's speed,
+//! for which JSBSim uses at least 1 rad/s. The first frame therefore adds P·dt/J (power, step, inertia) to the speed of
+//! a propeller at rest. For a model aircraft in steps of 10 ms this is 130,000 rpm, and the state is NaN 0.1 s later
 //! (`findings/jsbsim-electric-standstill.sh`). In steps of a hundredth of that length, the propeller accelerates
 //! correctly. Once it windmills, the usual step is stable at full throttle (`sitl/tests/plant/electric.rs`).
 

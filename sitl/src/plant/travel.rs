@@ -19,9 +19,9 @@ const ROUNDING_RAD: f64 = 1e-9;
 /// Deflections of a surface at rest at full command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stops {
-    /// At the command −1, rad.
+    /// Deflection at the command −1, rad.
     pub least_rad: f64,
-    /// At the command 1, rad.
+    /// Deflection at the command 1, rad.
     pub most_rad: f64,
 }
 

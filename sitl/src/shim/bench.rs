@@ -80,7 +80,7 @@ impl Bench {
         }
     }
 
-    /// Makes one step with the newest answer.
+    /// Makes one step with the newest answer. Returns why the flight is over; `None` if it continues.
     ///
     /// # Errors
     /// If the plant cannot be stepped, or the truth file cannot be written.

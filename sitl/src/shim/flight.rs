@@ -111,7 +111,8 @@ impl Flight {
         (StateFrame::new(time_us, &measured, self.travel), measured)
     }
 
-    /// Advances by one frame, with a plant step at `inputs` if launched. Returns `Some` when the flight is over.
+    /// Advances by one frame, with a plant step at `inputs` if launched. Returns why the flight is over; `None` if it
+    /// continues.
     pub fn advance(&mut self, inputs: Inputs) -> Result<Option<Over>, ShimError> {
         let mut truth = self.pending.back().map_or_else(Truth::default, |(_, truth)| *truth);
         if self.launched {

@@ -130,8 +130,8 @@ impl Launcher {
         }
     }
 
-    /// The state at the fraction `share` of the final speed. The factor `pull` of the catapult's acceleration is 1 on the
-    /// catapult and 0 on the stand.
+    /// The state at the fraction `share` of the final speed. `pull` is the factor on the catapult's acceleration: 1 on
+    /// the catapult and 0 on the stand.
     fn pulled(&self, share: f64, pull: f64) -> Truth {
         let released = self.released;
         let velocity = released.velocity_ned_mps.map(|v| v * share);

@@ -134,7 +134,7 @@ pub struct FrameFaults {
     pub delay_ms: f64,
     /// Probability that a frame is lost, 0 to below 1.
     pub drop_probability: f64,
-    /// Upper limit of a further uniformly distributed delay of each frame, from 0, ms of wall time.
+    /// Upper limit of an additional delay of each frame, which is uniformly distributed from 0, ms of wall time.
     pub jitter_ms: f64,
     /// Probability that a frame is delayed by a further `late_ms`, 0..1.
     pub late_probability: f64,
@@ -187,7 +187,8 @@ impl ShimOptions {
         Address { transport: Transport::UdpOut, endpoint: "127.0.0.1:14600".to_owned() }
     }
 
-    /// Options for real time and perfect sensors, held until armed, over [`ShimOptions::default_link`].
+    /// Options for a run in real time with perfect sensors over [`ShimOptions::default_link`]. The aircraft is held at
+    /// its start until the companion is armed.
     pub fn new(plant: PlantOptions, start: Start) -> Self {
         ShimOptions {
             link: Self::default_link(),

@@ -45,7 +45,7 @@ STATE = {  # column: (property, factor to SI)
 
 
 def load():
-    """The X8, loaded with the time step already set, because filters freeze theirs at loading."""
+    """Loads the X8. The time step is set before, because filters keep the step set at loading."""
     fdm = jsbsim.FGFDMExec(str(AIRCRAFT.parent))
     fdm.set_debug_level(0)
     fdm.set_aircraft_path(str(AIRCRAFT))
@@ -78,7 +78,7 @@ def start(fdm, airspeed=16.67, altitude=600.0, pitch=0.0, alpha=0.0, wind=CALM):
         fdm[f"atmosphere/wind-{name}-fps"] = speed / FT
     if wind == CALM:
         fdm["atmosphere/psiw-rad"] = 0.0
-    else:  # derivatives in this wind, and the integrators' histories filled with them
+    else:  # evaluates the derivatives in this wind and fills the integrators' histories with them
         fdm.set_dt(1e-12)
         for _ in range(5):
             fdm.run()
@@ -115,7 +115,7 @@ def held(rng):
 
 
 def ornstein_uhlenbeck(rng):
-    """Slow correlated noise about a nose-up elevator: the wing stalls."""
+    """Commands of slow correlated noise about a nose-up elevator, with which the wing stalls."""
     x = [0.0, 0.0, 0.0]
 
     def at(_fdm, _k):
@@ -127,7 +127,7 @@ def ornstein_uhlenbeck(rng):
 
 
 def pid(roll_deg, pitch_deg, airspeed=20.0):
-    """A small attitude controller: what it commands is realistic, how well it flies is no matter."""
+    """A simple attitude controller with realistic commands. Its accuracy does not matter."""
     roll, pitch = math.radians(roll_deg), math.radians(pitch_deg)
     integral = [0.0, 0.0, 0.0]
 
@@ -148,7 +148,7 @@ def pid(roll_deg, pitch_deg, airspeed=20.0):
 
 
 def with_gust(history):
-    """The same history, with a gust that begins with the step at 2 s."""
+    """The commands of `history`, with a gust that begins in the step at 2 s."""
 
     def at(fdm, k):
         if k == 200:
@@ -183,12 +183,12 @@ FLIGHTS = {  # name: (command history, steady wind)
 
 
 def fly(history, wind):
-    """The rows of one flight: commands of every step, the state after every fifth."""
+    """The rows of one flight: the commands of every step, and the state after every fifth step."""
     fdm = load()
     start(fdm, wind=wind)
     rows = []
     for k in range(STEPS):
-        # Six decimals are kept in the file, so six are flown.
+        # The file holds six decimals, so the commands are rounded to six before they are flown.
         inputs = [round(x, 6) for x in history(fdm, k)]
         command(fdm, *inputs)
         fdm.run()
@@ -206,8 +206,8 @@ def write_flights(out):
         (out / f"{name}.csv").write_text("\n".join([header, *lines]) + "\n")
 
 
-# Turbulence: wings level at 20 m/s and 400 m, where intensity depends on both the wind at 20 ft and
-# the severity. The first 20 s of every flight are left out.
+# Turbulence statistics: flights with level wings at 20 m/s and 400 m, where the intensity depends on
+# both the wind at 20 ft and the severity. The first 20 s of every flight are left out.
 EPISODES, SKIPPED, KEPT = 400, 2000, 6000
 WIND_20FT, SEVERITY = 7.6, 3
 BANDS_HZ = (0.05, 0.2, 0.8, 3.0, 12.0)
@@ -245,7 +245,7 @@ def turbulent_flight(seed):
 
 
 def seed(episode):
-    """Seeds far apart: JSBSim's generator is congruential, and nearby seeds give similar numbers."""
+    """A seed far from the others: JSBSim's congruential generator gives similar numbers for near seeds."""
     return (episode * 1_103_515_245 + 12_345) % 2**31
 
 

@@ -58,7 +58,8 @@ fn gust_blows_when_and_as_told() {
     assert!((flight[80].wind_ned_mps[1] - 2.0).abs() < 1e-6);
 }
 
-/// JSBSim keeps the wind's previous direction where its north component is zero.
+/// For a wind without a north component, JSBSim keeps the previous direction of the wind. The plant must set the
+/// direction, because the turbulence depends on it.
 #[test]
 fn turbulence_goes_with_a_wind_from_due_west() {
     let turbulence = Some(Turbulence { wind_20ft_mps: 15.0, severity: 5 });

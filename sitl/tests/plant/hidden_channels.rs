@@ -162,7 +162,7 @@ fn of_deflections(q: f64, aileron: f64, elevator: f64, drag: f64) -> Loads {
     }
 }
 
-/// Change of the loads if both deflections act as their values after `f`.
+/// Change of the loads if `f` maps both deflections (rad) before they act.
 fn acting_as(t: &Truth, q: f64, f: impl Fn(f64) -> f64) -> Loads {
     let (aileron, elevator) = (t.aileron_rad, t.elevator_rad);
     let drag = f(elevator).abs() - elevator.abs();
@@ -179,7 +179,8 @@ fn effects_on_the_surfaces_act_in_every_channel_the_surfaces_act_in() {
         acting_as(t, q, |x| x.signum() * (x.abs() - 0.02).max(0.0))
     });
     acts("backlash=0.02", 1, |_, t, q| acting_as(t, q, |x| x.signum() * (x.abs() - 0.01).max(0.0)));
-    // From rest: one step at the rate limit; half a step of a Tustin lag; no response to a delayed command.
+    // After one step from rest, the deflection has moved by one step at the rate limit, by DT / (2 T + DT) of the
+    // command with the lag (Tustin), or not at all with the delay.
     acts("rate_limit=0.5", 1, |_, t, q| acting_as(t, q, |x| x.signum() * 0.5 * DT_S));
     acts("actuator_lag=0.04", 1, |_, t, q| acting_as(t, q, |x| x * DT_S / (2.0 * 0.04 + DT_S)));
     acts("time_delay=0.05", 1, |_, t, q| acting_as(t, q, |_| 0.0));

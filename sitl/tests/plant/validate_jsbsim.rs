@@ -9,10 +9,11 @@ use crate::flights::{plant, plant_in};
 use greylag_sitl::air::{Air, Gust, Turbulence};
 use greylag_sitl::plant::{FULL_DEFLECTION_RAD, Inputs, Plant, Start};
 
-/// Largest difference relative to each column's largest magnitude; the port's measured difference is 1e-12, rounding only.
+/// Largest difference relative to each column's largest magnitude; the measured difference of the port is 1e-12, which
+/// is rounding.
 const TOLERANCE: f64 = 1e-9;
 
-/// Flies the commands of `golden`; returns the states at the steps for which it has a state.
+/// Flies the commands of `golden`. Returns the states at the steps for which `golden` has a state.
 fn replay(plant: &mut Plant, golden: &Golden) -> Vec<Row> {
     let mut rows = Vec::new();
     for (inputs, state) in &golden.steps {
@@ -143,7 +144,7 @@ impl Statistics {
     }
 }
 
-// Parameters of the flights for the turbulence statistics, as in generate.py except for their number.
+// Parameters of the flights for the turbulence statistics, as in generate.py except for the number of flights.
 const EPISODES: u32 = 200;
 const SKIPPED: usize = 2000;
 const KEPT: usize = 6000;

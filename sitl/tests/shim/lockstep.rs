@@ -257,10 +257,10 @@ fn lost_frames_delay_and_never_skip() {
     let states = companion.fly(200, |_| NEUTRAL);
     assert_consecutive(&states, STEP_US);
     let summary = shim.stop();
-    // For 200 frames, each sent until it passes, 200 · 0.3/0.7 = 86 transmissions are lost, ± 11 (1 σ).
+    // Each of 200 frames is sent until it is not lost, so 200 · 0.3/0.7 = 86 transmissions are lost, ± 11 (1 σ).
     assert!((40..=140).contains(&summary.dropped_frames), "{}", summary.dropped_frames);
     assert_eq!(summary.dropped_frames, summary.repeated_frames);
-    // Each loss costs about 20 ms, not 1 s as for a frame that really was lost.
+    // Each loss costs about 20 ms, not the 1 s after which a frame without an answer is repeated.
     assert!(begun.elapsed() < Duration::from_secs(15));
 }
 

@@ -135,7 +135,8 @@ fn slow_messages_show_the_truth(companion: &Companion, truth: &Table) {
 /// One row: cause, change of the options, command, frame, measured quantity, and expected value or sign.
 type Row = (&'static str, fn(&mut ShimOptions), [f32; 3], usize, fn(&State) -> f32, f32);
 
-/// The level flight at the start of each row is not trimmed, but the effect of each cause is larger.
+/// The flight at the start of each row is not trimmed, but the effect of each cause is larger than the untrimmed
+/// motion.
 const TABLE: [Row; 19] = [
     ("right bank", |o| o.start.roll_rad = 0.3, [0.0; 3], 0, |s| s.euler()[0] as f32, 0.3),
     ("left bank", |o| o.start.roll_rad = -0.3, [0.0; 3], 0, |s| s.euler()[0] as f32, -0.3),

@@ -1,5 +1,5 @@
 //! A simulated PX4 as the client of its simulator: TCP with rust-mavlink, by the public protocol.
-#![allow(dead_code)] // each test that includes this module uses its part
+#![allow(dead_code)] // Each test that includes this module uses a part of it.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};

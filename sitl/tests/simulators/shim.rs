@@ -141,8 +141,8 @@ fn frames_are_delayed_and_dropped_as_asked() {
     let summary = shim.stop();
     // Of 300 frames, 75 ± 7.5 (1 σ) are lost.
     assert!((45..=105).contains(&summary.dropped_frames), "{}", summary.dropped_frames);
-    // The answer to a frame with 35 ms of delay arrives after 3 or 4 newer frames. The latency is measured from the transmission,
-    // so it is that of the socket.
+    // The answer to a frame with 35 ms of delay arrives after 3 or 4 newer frames. The latency is measured from the
+    // transmission, so it contains only the delay of the socket.
     assert!(summary.latency.quantile(0.5) < Duration::from_millis(5), "{summary}");
     assert_eq!(summary.wrong_answers + summary.stale_answers, 0, "{summary}");
 }

@@ -1,5 +1,5 @@
 //! A simulated companion for tests: the other end of the link, over real sockets, with prescribed answers.
-#![allow(dead_code)] // each test that includes this module uses its part
+#![allow(dead_code)] // Each test that includes this module uses a part of it.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
@@ -189,7 +189,7 @@ impl Companion {
         let until = Instant::now() + patience;
         loop {
             for frame in std::mem::take(&mut self.waiting) {
-                // After a complete state frame, the next call handles the rest of the batch.
+                // The rest of the batch is dropped. It holds no message of the next state frame.
                 if let Some(state) = self.place(&frame) {
                     return Some(state);
                 }
@@ -233,7 +233,7 @@ impl Companion {
             }
             Road::Tcp(stream) => {
                 stream.set_read_timeout(Some(patience)).expect("a timeout");
-                // Reads at most one frame at a time, so no batch contains two.
+                // Reads less than one state frame, so no batch completes two.
                 let length = stream.read(&mut buffer[..64]).ok().filter(|&n| n > 0)?;
                 self.parser.stream(&buffer[..length], &mut |frame| waiting.push(frame));
             }

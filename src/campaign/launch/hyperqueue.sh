@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Campaign @NAME@ on HyperQueue: an array of tasks a stage, each stage after the one before.
+# Runs campaign @NAME@ on HyperQueue. Each stage is an array of tasks and starts after the stage before it.
 set -euo pipefail
 export GREYLAG=@PROGRAM@ CAMPAIGN=@FILE@ OUT=@OUT@
 mkdir -p "$OUT/logs"
 stage() {
-  # status 75: a later attempt may succeed; above 128: killed, as for want of memory; 1: none will
+  # exit status 75: another attempt may succeed; above 128: killed, for example for lack of memory; 1: no attempt will succeed
   hq submit --wait --name "@NAME@-$1" --array "$2-$3" --crash-limit @ATTEMPTS@ \
     --stdout "$OUT/logs/$1-%{TASK_ID}.txt" --stderr "$OUT/logs/$1-%{TASK_ID}.err.txt" \
     --env GREYLAG="$GREYLAG" --env CAMPAIGN="$CAMPAIGN" --env OUT="$OUT" --env RAYON_NUM_THREADS=1 @OPTIONS@ \

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Campaign @NAME@ with GNU parallel: the cells of a stage side by side, each stage after the one before.
+# Runs campaign @NAME@ with GNU parallel. The cells of a stage run in parallel. A stage starts after the stage before it.
 set -euo pipefail
 export GREYLAG=@PROGRAM@ CAMPAIGN=@FILE@ OUT=@OUT@ RAYON_NUM_THREADS=1
 mkdir -p "$OUT/logs"
 one() {
-  # status 75: a later attempt may succeed; above 128: killed, as for want of memory; 1: none will
+  # exit status 75: another attempt may succeed; above 128: killed, for example for lack of memory; 1: no attempt will succeed
   for attempt in $(seq @ATTEMPTS@); do
     "$GREYLAG" campaign run "$CAMPAIGN" --out "$OUT" --cell "$1" > "$OUT/logs/$1.txt" 2>&1 && return 0
     status=$?

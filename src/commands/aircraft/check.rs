@@ -1,4 +1,4 @@
-//! `greylag aircraft check`: computes how a model's aircraft flies.
+//! `greylag aircraft check`: computes trim, modes, control authority and stability margins of a model's aircraft.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -85,7 +85,7 @@ pub fn page(file: &Path, model: &GreyBox) -> Result<String> {
     Ok(report.page().render())
 }
 
-/// Prints trim, modes, authority and loops, then the findings.
+/// Prints trim, modes, control authority and the margins of the LQI's loops, then the findings.
 pub fn print(found: &AircraftCheck) {
     println!("\n{}", levels(found));
     println!("\n{}", modes(found));

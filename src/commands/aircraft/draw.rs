@@ -32,16 +32,16 @@ pub struct Arguments {
     /// Seed of the draws.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// How many to draw.
+    /// Number of aircraft to draw.
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     count: u32,
-    /// Show the first draws one by one, so many.
+    /// Number of draws, from the first one, to list individually.
     #[arg(long, value_name = "N", default_value_t = 0)]
     show: usize,
-    /// Models to place among the draws [default: those of the shipped aircraft].
+    /// Models to compare with the draws [default: those of the shipped aircraft].
     #[arg(long = "model", value_name = "FILE", num_args = 1..)]
     models: Vec<PathBuf>,
-    /// Folder to write each draw's airframe.toml and model.toml to, in a folder of its number.
+    /// Folder for the files: airframe.toml and model.toml of each draw, in a subfolder named by its number.
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
 }

@@ -32,7 +32,7 @@ struct Jsbsim {
     model: Vec<PathBuf>,
     /// Folder in which the aircraft's folder is made.
     dir: PathBuf,
-    /// The aircraft's name there: letters, digits, `_` and `-`.
+    /// Name of the JSBSim aircraft: letters, digits, `_` and `-`.
     name: String,
 }
 

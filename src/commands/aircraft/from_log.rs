@@ -16,7 +16,7 @@ use crate::model::GreyBox;
 
 /// Largest ratio of standard deviation to magnitude at which a coefficient counts as determined.
 const KNOWN: f64 = 0.3;
-/// Prefix of a coefficient's name, and a manoeuvre that excites these coefficients.
+/// Prefixes of coefficients' names, each with a manoeuvre that excites these coefficients.
 const MANOEUVRES: [(&str, &str); 7] = [
     ("roll_linear", "aileron doublets, then bank to bank reversals"),
     ("pitch_linear", "elevator doublets at three airspeeds"),
@@ -81,8 +81,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(status)
 }
 
-/// Removes what a failed run wrote, so that the corrected command can be run again. `made` says whether the run made
-/// `folder` and `prior`: a folder that was there before keeps its other files.
+/// Removes the files that a failed run wrote, so that the corrected command can be run again. `made` tells whether the run
+/// created `folder` and `prior`. A folder that existed before keeps its other files.
 fn remove(folder: &Path, prior: &Path, made: [bool; 2]) {
     let _ = match made {
         [true, _] => std::fs::remove_dir_all(folder),
@@ -127,8 +127,8 @@ fn next(folder: &Path, fitted: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Names of the coefficients that the flights do not determine. A standard deviation that is no finite number is `null`
-/// in the file: nothing is known of its coefficient.
+/// Names of the coefficients that the flights do not determine. A standard deviation of `null` in the file was not finite,
+/// so its coefficient counts as not determined.
 fn unknown(story: &serde_json::Value) -> Vec<String> {
     let all = story["parameters"].as_array().into_iter().flatten();
     let unknown = all.filter(|p| match (p["value"].as_f64(), p["sd"].as_f64()) {

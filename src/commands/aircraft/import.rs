@@ -22,7 +22,7 @@ enum From {
     Jsbsim(super::import_jsbsim::Jsbsim),
 }
 
-/// Imports an aircraft, writes its files and lists the effects that they do not represent.
+/// Imports an aircraft, writes its files and lists the effects that the files do not represent.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.from {
         From::Derivatives(file) => super::import_derivatives::run(file),

@@ -11,10 +11,10 @@ use super::new::{self, Common};
 use crate::commands::status;
 use crate::model::derivatives::{self, Beside};
 
-/// The unit of the control derivatives.
+/// Unit of deflection of the control derivatives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Angle {
-    /// A degree, as AVL has it for a control of gain one.
+    /// One degree, as in AVL for a control with a gain of one.
     Deg,
     /// One radian of deflection.
     Rad,
@@ -34,7 +34,7 @@ pub struct Derivatives {
     /// Metres in the file's unit of length: 0.3048 for feet.
     #[arg(long, value_name = "M", default_value_t = 1.0)]
     unit_m: f64,
-    /// Unit of the control derivatives; XFLR5's are by a radian always.
+    /// Unit of deflection of the control derivatives; those of XFLR5 are always per radian.
     #[arg(long, value_enum, default_value = "deg")]
     control_unit: Angle,
 }

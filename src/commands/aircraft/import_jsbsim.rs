@@ -14,7 +14,7 @@ use crate::control::aircraft_check;
 use crate::model::GreyBox;
 use crate::sim::import::{Imported, import};
 
-/// Cruise airspeeds are below this, m/s.
+/// Upper limit of the accepted cruise airspeeds, m/s.
 const FASTEST_MPS: f64 = 1000.0;
 
 /// The arguments of `greylag aircraft import jsbsim`.
@@ -22,18 +22,18 @@ const FASTEST_MPS: f64 = 1000.0;
 pub struct Jsbsim {
     /// Folder that holds NAME/NAME.xml.
     dir: PathBuf,
-    /// The aircraft's name, that of its file.
+    /// Name of the aircraft, which is also the name of its file.
     name: String,
     /// Folder to make, with airframe.toml and model.toml.
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
-    /// True airspeed about which it is taken.
+    /// True airspeed about which the derivatives are taken.
     #[arg(long, value_name = "MPS")]
     cruise_mps: f64,
-    /// Altitude at which it is taken, above mean sea level.
+    /// Altitude at which the derivatives are taken, above mean sea level.
     #[arg(long, value_name = "M", default_value_t = 600.0)]
     altitude_m: f64,
-    /// Name a property of the aircraft (may be repeated), as `greylag evaluate` does; without any,
+    /// Name a property of the aircraft (may be repeated), as for `greylag evaluate`; without this option,
     /// unusual commands and surfaces are found by trying all. NAME may be -NAME*SCALE,NAME,….
     #[arg(long, value_name = "KEY=NAME", value_parser = property)]
     property: Vec<(String, String)>,
@@ -42,7 +42,7 @@ pub struct Jsbsim {
     set: Vec<(String, f64)>,
 }
 
-/// Imports the aircraft, writes its files and lists the effects that they do not represent.
+/// Imports the aircraft, writes its files and lists the effects that the files do not represent.
 pub fn run(jsbsim: &Jsbsim) -> Result<ExitCode> {
     let (cruise, altitude) = (jsbsim.cruise_mps, jsbsim.altitude_m);
     if !(cruise > 0.0 && cruise < FASTEST_MPS && altitude.is_finite()) {
@@ -87,7 +87,7 @@ pub fn run(jsbsim: &Jsbsim) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Writes the imported files to a temporary folder and reads the model back. Files that cannot be read are not kept.
+/// Writes the imported files to a temporary folder and reads the model back, before anything is written to the user's folder.
 fn read_back(found: &Imported) -> Result<GreyBox> {
     let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
     let model = folder.path().join("model.toml");

@@ -44,7 +44,7 @@ pub struct Arguments {
     common: Common,
 }
 
-/// Measures that any aircraft needs without flight data.
+/// Data of an aircraft from which a model can be estimated without flights.
 #[derive(clap::Args)]
 pub struct Common {
     /// The aircraft's name [default: the folder's].
@@ -126,7 +126,7 @@ pub fn files(folder: &Path, airframe: &str, model_text: &str) -> Result<PathBuf>
     Ok(model)
 }
 
-/// Checks the dimensions that the user gives, and adds the defaults.
+/// Checks the mass and dimensions that the user gives, and adds the defaults.
 pub fn measures(arguments: &Common, folder: &Path, span_m: f64, area_m2: f64) -> Result<Measures> {
     let Common { mass_kg, travel_deg, .. } = *arguments;
     let thrust = arguments.static_thrust_n.map(|n| ("--static-thrust-n", n, 1e6));

@@ -46,8 +46,8 @@ pub struct Arguments {
     model: PathBuf,
     #[command(flatten)]
     logs: LogArguments,
-    /// Logs to judge by, which the fit does not see; without them the last log, or, of a single one,
-    /// its last third.
+    /// Logs for validation, which the fit does not see [default: the last log, or the last third of a
+    /// single log].
     #[arg(long, num_args = 1..)]
     hold_out: Vec<PathBuf>,
     /// Add the effects that a diagnosis of these logs asserts.
@@ -56,15 +56,15 @@ pub struct Arguments {
     /// Add the effects that this diagnosis asserts: the JSON of `greylag diagnose`.
     #[arg(long, group = "what", value_name = "JSON")]
     diagnosis: Option<PathBuf>,
-    /// Add these effects, in this order: ids of the catalogue, or effect files (TOML); with --accept after those
-    /// that are asserted.
+    /// Add these effects, in this order: ids of the catalogue, or effect files (TOML); with --accept, after the
+    /// asserted effects.
     #[arg(long = "effect", value_name = "ID|FILE", num_args = 1.., group = "what")]
     effects: Vec<String>,
     /// Add nothing: fit the model's own coefficients.
     #[arg(long, group = "what", conflicts_with_all = ["accept", "diagnosis", "effects"])]
     tune_only: bool,
-    /// Also try the model's other conventions (integrator, axes of the forces, the standard
-    /// atmosphere), and adopt those that the flights support, the atmosphere unless they contradict
+    /// Also try other conventions (integrator, axes of the forces, the standard atmosphere); adopt
+    /// integrator and axes if the flights support them, the atmosphere unless the flights contradict
     /// it.
     #[arg(long)]
     conventions: bool,
@@ -74,19 +74,19 @@ pub struct Arguments {
     from_scratch: bool,
     #[command(flatten)]
     per_flight: PerFlightArguments,
-    /// Bound a coefficient by LEAST and MOST in place of what is usual for an aircraft of this
-    /// size, such as lift_linear.CL0=-2..2; the amended model's file records it.
+    /// Bound a coefficient by LEAST and MOST in place of the catalogue's bounds for an aircraft of this
+    /// size, such as lift_linear.CL0=-2..2; the amended model's file records the bounds.
     #[arg(long = "bound", value_name = "NAME=LEAST..MOST", num_args = 1.., value_parser = bounds::bound)]
     bounds: Vec<bounds::Bound>,
-    /// Write effects into the model that the data refuse, and a fit that predicts the flights held out no better.
+    /// Write the fit even if it predicts the held-out flights no better, and keep effects that the data refuse.
     #[arg(long)]
     accept_anyway: bool,
-    /// Fit to all logs: nothing is held out, so that the errors are those of the flights that were fitted.
+    /// Fit to all logs: nothing is held out, so the printed errors are those of the fitted flights.
     #[arg(long, conflicts_with = "hold_out")]
     fit_all: bool,
-    /// Write no model: predict each log by a fit to all others, for the model as given, tuned, with
-    /// trims and axes of each flight, from scratch and with each effect, and report the simplest of
-    /// these within one standard error of the best.
+    /// Write no model: predict each log by a fit to all others, for these structures: the model as given,
+    /// tuned, with trims and axes of each flight, from scratch, and with each effect; report the simplest
+    /// structure within one standard error of the best.
     #[arg(long, conflicts_with_all = ["hold_out", "fit_all", "conventions", "from_scratch", "report", "accept_anyway"])]
     leave_one_out: bool,
     /// Folder for model.toml, the airframe and amend.json, or for leave-one-out.json; created if
@@ -162,7 +162,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 impl Arguments {
-    /// Refuses a log that is named twice and, for constants of single flights, two logs of one file name.
+    /// Checks that no log is named twice and, if flights have constants of their own, that all file names differ.
     fn check_logs(&self) -> Result<()> {
         distinct(&self.logs.paths, &self.hold_out)?;
         match self.per_flight.asked().constants().is_empty() {
@@ -181,7 +181,7 @@ fn given_is_kept(arguments: &Arguments, story: &Amendment) -> Option<String> {
     story.worse().or_else(by_chance).or_else(unjudged).filter(|_| !arguments.accept_anyway)
 }
 
-/// The next step for the user: a diagnosis of what the amended model still lacks.
+/// The command to run next: a diagnosis of the amended model.
 fn next(arguments: &Arguments, places: &Places) -> String {
     let logs = &arguments.logs;
     format!("greylag diagnose --model {}{}", quoted(&places.model()), logs.words())
@@ -209,7 +209,7 @@ fn doubtful(story: &Amendment) -> bool {
 /// Carries out `--leave-one-out`: prints a table of structures and writes no model.
 fn structures(arguments: &Arguments, model: &GreyBox) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
-    // a copy of the flight that is left out would be fitted to
+    // the fit would see a copy of the flight that is left out
     distinct(&arguments.logs.paths, &[])?;
     std::fs::create_dir_all(&arguments.out)
         .with_context(|| format!("cannot make the folder {}", arguments.out.display()))?;
@@ -243,8 +243,8 @@ fn check_new(effects: &[String], model: &GreyBox) -> Result<()> {
     Ok(())
 }
 
-/// The flights for validation: the flights held out. If none is held out, it is the last third of the only flight in
-/// `taken`, which keeps the first two thirds. With `--fit-all` it is all flights.
+/// The flights for validation: the held-out flights. If none is held out, the only flight in `taken` is split: its last
+/// third is returned, and `taken` keeps the first two thirds. With `--fit-all`, all flights are returned.
 fn tests(
     arguments: &Arguments,
     held: Vec<PathBuf>,
@@ -302,8 +302,8 @@ fn page(
     Ok(report.page().render())
 }
 
-/// Logs for the fit and logs for validation. If none is held out, the last log is for validation. A single log stays
-/// whole. With `--fit-all` all logs are for both.
+/// Logs for the fit and logs for validation. If none is held out, the last log is for validation. A single log is only
+/// for the fit. With `--fit-all` all logs are for both.
 fn divided(arguments: &Arguments) -> (Vec<PathBuf>, Vec<PathBuf>) {
     let logs = &arguments.logs.paths;
     if arguments.fit_all {

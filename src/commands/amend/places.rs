@@ -33,7 +33,7 @@ impl Drop for Places {
     /// Removes the folder if this run made it and it is empty.
     fn drop(&mut self) {
         if self.made {
-            // a folder with files is not removed
+            // `remove_dir` does not remove a folder with files
             let _ = fs::remove_dir(&self.folder);
         }
     }
@@ -79,7 +79,7 @@ impl Places {
         self.folder.join(MODEL)
     }
 
-    /// Writes the model and the results, and checks that the written model reads back identical to the bit.
+    /// Writes the model and the results, and checks that the model read back from its file has the same numbers to the bit.
     pub fn write(
         &self,
         before: &GreyBox,

@@ -60,7 +60,7 @@ fn own_unit(name: &str) -> (f64, &'static str) {
     }
 }
 
-/// Free-run errors on the validation flights.
+/// Errors of free runs (open-loop simulations) on the validation flights.
 fn error_table(story: &Amendment) -> Table {
     let header = ["NRMSE on held-out flights", "1 s", "2 s", "5 s", "10 s", "diverged"];
     let mut table = table(header, 1);

@@ -24,8 +24,8 @@ pub struct Arguments {
     /// Write the duration, date and processor of each cell.
     #[arg(long, value_name = "FILE.jsonl")]
     times: Option<PathBuf>,
-    /// Take the results of other machines for the cells that are not done here: files that
-    /// `--results` wrote on them.
+    /// Files that `--results` wrote on other machines; their results are taken for the cells that
+    /// are not done here.
     #[arg(long, value_name = "FILE.jsonl", num_args = 1..)]
     join: Vec<PathBuf>,
     /// Replace the files if they exist.

@@ -109,7 +109,7 @@ fn ended(plan: &Plan, store: &Store) -> Result<ExitCode> {
 }
 
 impl Local<'_> {
-    /// Runs cells as long as one can be run. Returns whether Ctrl-C ended the run.
+    /// Runs cells until none can be run any more. Returns whether Ctrl-C ended the run.
     fn all(&mut self) -> Result<bool> {
         self.show()?;
         loop {
@@ -130,7 +130,7 @@ impl Local<'_> {
         }
     }
 
-    /// The first cell that can be run at once; `None` if there is none.
+    /// Index of the first waiting cell that can be started now. `None` if there is none.
     fn next(&self, now: Instant) -> Option<usize> {
         let ready = |i: &usize| {
             let State::Waiting { not_before, .. } = self.states[*i] else { return false };
@@ -166,7 +166,7 @@ impl Local<'_> {
             .arg(self.file)
             .arg("--out")
             .arg(self.store.folder())
-            // The cell is named by id. Its number changes if the campaign file is edited during the run.
+            // The cell is named by id, because its number changes if the campaign file is edited during the run.
             .args(["--cell", &cell.id])
             .env("RAYON_NUM_THREADS", (cores / self.jobs).max(1).to_string())
             .stdin(Stdio::null())
@@ -275,7 +275,7 @@ impl Local<'_> {
             std::thread::sleep(LOOK);
         }
         for child in self.running.values_mut() {
-            // the cell's files are complete, and a restart resumes from them
+            // the cell's checkpoint is complete, and a restart resumes from it
             let _ = child.kill();
             let _ = child.wait();
         }

@@ -30,9 +30,9 @@ pub struct Arguments {
 
 #[derive(clap::Subcommand)]
 enum What {
-    /// Show what a campaign holds: its cells, what each costs, what each writes.
+    /// Show the cells of a campaign, their costs and their outputs.
     Plan(plan::Arguments),
-    /// Run cells: all on this machine, one, or by the script of a scheduler.
+    /// Run cells: all on this machine, a single one, or all through a scheduler.
     Run(run::Arguments),
     /// Join the results, and list the cells that are missing.
     Gather(gather::Arguments),
@@ -51,7 +51,7 @@ struct Which {
     out: Option<PathBuf>,
 }
 
-/// Plans, runs, joins or reports.
+/// Runs the chosen subcommand of `greylag campaign`.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.what {
         What::Plan(arguments) => plan::run(arguments),

@@ -20,19 +20,19 @@ pub struct Arguments {
     /// Run all cells on this machine.
     #[arg(long)]
     local: bool,
-    /// Cells at once on this machine [default: its cores].
+    /// Number of cells to run in parallel [default: the number of cores].
     #[arg(long, value_name = "N", requires = "local", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
-    /// Try cells again that failed for good.
+    /// Try again the cells that failed for good.
     #[arg(long, requires = "local")]
     failed: bool,
-    /// Run one cell, by its number or id, as a scheduler does; status 75: try again, 1: never.
+    /// Run one cell, given by its number or id; exit status 75: a later attempt may succeed, 1: it failed for good.
     #[arg(long, value_name = "ID")]
     cell: Option<String>,
-    /// Print the script that hands the cells to a scheduler.
+    /// Print the script that submits the cells to a scheduler.
     #[arg(long, value_enum)]
     launcher: Option<Launch>,
-    /// Run that script at once.
+    /// Run the script of the scheduler instead of printing it.
     #[arg(long, requires = "launcher")]
     submit: bool,
     /// Further options of the scheduler, such as `--partition=short --time=02:00:00`.

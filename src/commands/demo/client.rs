@@ -1,4 +1,4 @@
-//! The client of the demonstration: arms, enters offboard, flies the schedule over a real socket.
+//! The client of the demonstration. It arms, enters offboard mode and flies the schedule over a real socket.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -67,8 +67,8 @@ impl Client {
         })
     }
 
-    /// Arms, enters offboard, flies every leg, and goes to hold. `watch` receives the number of the leg, the time on
-    /// the leg (s) and the view. If `ended` becomes true, the remaining legs are skipped. Returns the companion's texts
+    /// Arms, enters offboard mode, flies every leg, and enters hold mode. `watch` receives the index of the leg, the time
+    /// on the leg (s) and the view. If `ended` becomes true, the remaining legs are skipped. Returns the companion's texts
     /// with their times, s.
     pub fn fly(
         &mut self,
@@ -110,7 +110,7 @@ impl Client {
         self.target = (leg.roll_deg.to_radians(), leg.pitch_deg.to_radians());
     }
 
-    /// Sends the request every half second until `so` holds. Fails after `ANSWER_TIMEOUT`.
+    /// Sends the request `ask` every half second until the condition `so` is true. Fails after `ANSWER_TIMEOUT`.
     fn until(
         &mut self,
         what: &str,
@@ -172,7 +172,7 @@ impl Client {
         let _ = self.socket.send(bytes);
     }
 
-    /// The companion's last text, without confirmations of requests.
+    /// The companion's last text that does not confirm a request.
     fn last_text(&self) -> &str {
         let done = |words: &str| words.starts_with("mode ") || words.starts_with("armed");
         let last = self.texts.iter().rev().find(|(_, words)| !done(words));

@@ -4,7 +4,7 @@
 pub const ROWS: usize = 9;
 /// Columns of the indicator, an odd number.
 const COLUMNS: usize = 27;
-/// Degrees of pitch in a row.
+/// Pitch angle per row, degrees.
 const DEGREES_A_ROW: f64 = 10.0;
 /// Ratio of height to width of a character.
 const ASPECT: f64 = 2.0;
@@ -14,7 +14,7 @@ pub fn rows(roll_deg: f64, pitch_deg: f64) -> [String; ROWS] {
     let (sin, cos) = roll_deg.to_radians().sin_cos();
     let middle = |n: usize| (n / 2) as f64;
     std::array::from_fn(|row| {
-        // distances to the right of and below the middle, rows
+        // distances to the right of and below the middle, in rows
         let down = row as f64 - middle(ROWS);
         let cell = |column: usize| {
             let right = (column as f64 - middle(COLUMNS)) / ASPECT;

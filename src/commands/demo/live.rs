@@ -19,7 +19,7 @@ pub struct Live<'a> {
     leg: Option<usize>,
     line: String,
     shown: Duration,
-    /// Lines that the next drawing replaces.
+    /// Number of lines of the last drawing, which the next one replaces.
     drawn: usize,
 }
 

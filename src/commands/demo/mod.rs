@@ -1,4 +1,5 @@
-//! `greylag demo`: runs shim, companion and client in one program, over real sockets.
+//! `greylag demo`: runs the simulator with its MAVLink side (the shim), the companion and a client in one program, over
+//! real sockets.
 
 mod client;
 mod indicator;
@@ -137,7 +138,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(verdict(&report, trouble.as_deref()))
 }
 
-/// The error of a flight that ended early. If this computer was too slow, its timing trouble is given as the cause.
+/// The error of a flight that ended early. If this computer was too slow, its timing problem is given as the cause.
 fn excused(why: anyhow::Error, trouble: Option<&str>) -> anyhow::Error {
     match trouble {
         Some(trouble) => why.context(trouble.to_owned()),
@@ -185,7 +186,8 @@ fn as_client(arguments: &Arguments, to: SocketAddr, legs: &Legs) -> Result<Vec<(
     flown
 }
 
-/// Candidates of the planner, replayed from the recording with `again`. The list is empty if the replay fails.
+/// The planner's candidate plans, computed again from the recording with the companion `again`. The list is empty if the
+/// replay fails.
 fn sights(
     folder: &Path,
     mut again: Companion,
@@ -263,7 +265,7 @@ fn simulate(
         .context("starting the shim's thread")
 }
 
-/// Prints how each target was tracked. If one was not tracked, also prints the timing trouble of this computer.
+/// Prints how each target was tracked. If a target was not tracked, also prints the timing problem of this computer.
 fn verdict(report: &FlightReport<'_>, trouble: Option<&str>) -> ExitCode {
     let (tracked, all) = (report.tracked(), report.segments.len());
     let qualities = report.qualities().unwrap_or_default();

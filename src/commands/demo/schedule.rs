@@ -18,12 +18,12 @@ pub struct Leg {
 /// Length of a leg, s. Six legs and the start-up take less than a minute.
 pub const LEG_S: f64 = 8.0;
 
-/// Largest bank for which the legs are written, degrees: that of the paper's hard targets.
+/// Bank limit for which the legs are written, degrees: the largest bank of the paper's hard targets.
 const BANK_DEG: f64 = 60.0;
-/// Largest magnitude of pitch for which the legs are written, degrees.
+/// Pitch limit for which the legs are written, up and down, degrees.
 const PITCH_DEG: f64 = 30.0;
 
-/// Easy targets, then hard targets. Climbs and dives alternate to restore the altitude.
+/// Easy targets, then hard targets. Climbs and dives are mixed to keep the altitude.
 pub const LEGS: [Leg; 6] = [
     leg(20.0, 5.0, Difficulty::Easy),
     leg(-30.0, 12.0, Difficulty::Easy),
@@ -61,7 +61,7 @@ impl Legs {
         Legs { legs: LEGS.iter().map(within).collect(), seconds: LEG_S }
     }
 
-    /// Wings level while the companion flies `schedule`, and for 2 s longer.
+    /// A single leg with level wings, during which the companion flies `schedule`. The leg ends 2 s after the schedule.
     pub fn during(schedule: &Schedule) -> Legs {
         Legs { legs: vec![leg(0.0, 0.0, Difficulty::Easy)], seconds: schedule.duration() + 2.0 }
     }

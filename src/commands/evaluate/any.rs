@@ -24,8 +24,8 @@ pub(super) struct AnyArguments {
     /// Distribution that --any draws from.
     #[arg(long, value_name = "FILE", default_value = "params/any/aircraft.toml", requires = "any")]
     population: PathBuf,
-    /// Change each drawn aircraft after 30 s, by all of these in turn: half the aileron, mass +30 %, centre of gravity 5 % of
-    /// the chord aft, one elevon or aileron stuck.
+    /// Fly each drawn aircraft also with each of these changes after 30 s: half the aileron, mass +30 %, centre of gravity 5 %
+    /// of the chord aft, one elevon or aileron stuck.
     #[arg(long, requires = "any")]
     change: bool,
     /// Models whose aircraft --any flies too; a controller that needs a model is designed from them.
@@ -37,9 +37,9 @@ pub(super) struct AnyArguments {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Knowledge {
-    /// Cruise airspeed and rudder.
+    /// Cruise airspeed, and whether the aircraft has a rudder.
     Nothing,
-    /// Mass, span, area, tail: a textbook's estimates.
+    /// The textbook model, estimated from mass, span, area and tail.
     Textbook,
     /// The aircraft's own model.
     Exact,
@@ -55,16 +55,16 @@ impl Knowledge {
     }
 }
 
-/// One minute of one aircraft.
+/// A flight of one minute with one aircraft and one controller.
 #[derive(Serialize)]
 pub(super) struct Flight {
     aircraft: String,
     pub(super) controller: &'static str,
     knows: Knowledge,
-    /// What changed after 30 s.
+    /// Name of the change after 30 s. `None` if nothing changed.
     #[serde(skip_serializing_if = "Option::is_none")]
     change: Option<&'static str>,
-    /// `None` where no controller could be designed.
+    /// Results of the minute. `None` if no controller could be designed.
     minute: Option<Minute>,
     /// Ratios of the derivatives estimated in this flight to the aircraft's own, in the order of `DERIVATIVES`; `None`
     /// for an unknown one. Empty after a change.
@@ -192,7 +192,7 @@ fn of_model(kinds: &[ControllerKind], model: &GreyBox, seed: u64) -> Vec<Flight>
     kinds.iter().flat_map(of).collect()
 }
 
-/// Flies a controller designed from the first model in the second one, once for each change.
+/// Flies the aircraft of the model `exact` with a controller designed from the model `from`, once for each change.
 fn of_controller(
     (kind, knows): (ControllerKind, Knowledge),
     [from, exact]: [&GreyBox; 2],
@@ -223,7 +223,7 @@ fn of_controller(
     changes.iter().map(&mut fly).collect()
 }
 
-/// A table of the aircraft kept after each change: one row for each controller and its information.
+/// A table of the aircraft that were not lost after each change: one row for each controller, its information and a change.
 fn after_changes(kinds: &[ControllerKind], before: &[Flight], after: &[Flight]) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
@@ -234,7 +234,7 @@ fn after_changes(kinds: &[ControllerKind], before: &[Flight], after: &[Flight]) 
             let unchanged: Vec<&Flight> = before.iter().filter(own).collect();
             for change in Change::ALL {
                 let changed = after.iter().filter(own).filter(|f| f.change == Some(change.name()));
-                // the flights are in the order of the aircraft in both
+                // both lists have the same order of aircraft
                 let pairs = unchanged.iter().zip(changed).filter(|(u, _)| kept(u).is_some());
                 let flights: Vec<&Flight> = pairs.map(|(_, c)| c).collect();
                 let minutes: Vec<f64> =
@@ -285,7 +285,7 @@ fn summary(kinds: &[ControllerKind], flights: &[Flight]) -> Table {
     table
 }
 
-/// `some` of `all` in per cent; a dash if there are none, for example if every aircraft was lost.
+/// `some` of `all` in percent; a dash if `all` is zero, for example if every aircraft was lost.
 pub(super) fn percent(some: usize, all: usize, digits: usize) -> String {
     match all {
         0 => "-".into(),

@@ -10,7 +10,7 @@ use crate::model::population::{Character, TRAITS};
 use crate::num::statistics::quantile;
 use crate::physics::atmosphere::STANDARD_GRAVITY;
 
-/// The trait that holds the magnitude of each derivative, and the power of V/g that makes it dimensionless.
+/// For each derivative, the trait with its magnitude and the power of V/g that makes it dimensionless.
 const MAGNITUDES: [(&str, i32); DERIVATIVES.len()] =
     [("roll power", 2), ("roll damping", 1), ("pitch power", 2), ("pitch stiffness", 2)];
 
@@ -36,8 +36,8 @@ pub(super) fn ratios(estimator: &AircraftEstimator, exact: &GreyBox) -> Vec<Opti
     all.map(|(estimated, own)| Some(estimated / own).filter(|r| r.is_finite())).collect()
 }
 
-/// One row for each controller and derivative: median and 90th percentile of the relative error over the flights without a
-/// loss.
+/// One row for each controller and derivative: median and 90th percentile of the relative error over the flights in which
+/// the aircraft was not lost.
 pub(super) fn table(kinds: &[ControllerKind], flights: &[Flight]) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);

@@ -1,4 +1,4 @@
-//! The file in which a fault campaign records its flights, one JSON object a line. An interrupted campaign resumes from
+//! The file in which a fault campaign records its flights, one JSON object per line. An interrupted campaign resumes from
 //! this file.
 
 use std::collections::HashMap;
@@ -122,7 +122,7 @@ impl Ledger {
                 known.insert(entry.key(), entry);
                 line.clear();
             }
-            // the first line of a killed run may be cut off anywhere; another file must not be emptied for it
+            // a killed run may have cut off its first line anywhere; a file with other content must not be emptied
             let cut = line.starts_with(START) || START.starts_with(&line);
             ensure!(
                 whole > 0 || cut,

@@ -12,7 +12,7 @@ use crate::sim::faults::{ATTITUDE_DEG, CompanionFactory, FAILS_S, Failure, Watch
 /// Largest accepted fraction of healthy flights with a false alarm: one in forty.
 const FALSE_ALARMS: f64 = 1.0 / 40.0;
 
-/// Flies and prints a table. The exit status is 1 if too many healthy flights raised an alarm.
+/// Flies the flights and prints a table. The exit status is 1 if too many healthy flights had a false alarm.
 ///
 /// # Errors
 /// If the aircraft cannot be built, or a seed would exceed 64 bits.

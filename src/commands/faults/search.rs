@@ -24,7 +24,7 @@ pub(super) struct Search<'a> {
     pub(super) json: &'a JsonArgument,
 }
 
-/// A rule as JSON.
+/// Result of the search for one rule, as JSON.
 #[derive(Serialize)]
 struct Row<'a> {
     policy: &'a str,
@@ -33,7 +33,7 @@ struct Row<'a> {
     broken: u64,
     distance: Option<f64>,
     at_s: f64,
-    /// The flight with the smallest robustness, reduced if it violates the rule.
+    /// The flight with the smallest robustness, simplified if it violates the rule.
     scenario: Option<&'a Scenario>,
 }
 

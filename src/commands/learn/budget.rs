@@ -1,11 +1,11 @@
-//! Budgets of a learning: numbers of flights, updates and hidden units.
+//! Budgets of `greylag learn`: numbers of flights, updates and hidden units.
 
 use clap::ValueEnum;
 
 /// A budget by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Budget {
-    /// Tens of seconds: to see it work.
+    /// Tens of seconds, for a first try.
     Quick,
     /// A controller that flies acceptably, in minutes on two cores.
     Standard,
@@ -16,7 +16,7 @@ pub enum Budget {
 /// Name of the training algorithm of the policy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Algorithm {
-    /// The gradient of the reward through the model, then critics of the policy found.
+    /// Analytic policy gradient through the model, then critics fitted to the resulting policy.
     Analytic,
     /// TD3 as in the paper.
     Td3,

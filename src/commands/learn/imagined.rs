@@ -13,11 +13,11 @@ use crate::model::GreyBox;
 use crate::sim::evaluation::{Evaluation, imagine};
 use crate::sim::{Group, TargetFile};
 
-/// Seed of the targets. They differ from the targets that score controllers and from the targets by which a training
-/// chooses its policy.
+/// Seed of the targets. These targets differ from the targets of `greylag evaluate` and from the targets by which a
+/// training chooses its policy.
 const TARGETS: u64 = 3;
-/// Each controller flies one in this many targets. A planner takes milliseconds a step, and few targets suffice for the
-/// LQI.
+/// Controllers, each with a number n: the controller flies one target in n. A planner takes milliseconds a step, and few
+/// targets suffice for the LQI.
 const EVERY: [(ControllerKind, u32); 3] =
     [(ControllerKind::Policy, 1), (ControllerKind::Lqi, 4), (ControllerKind::HybridLqi, 24)];
 

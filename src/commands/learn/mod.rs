@@ -41,40 +41,40 @@ pub struct Arguments {
     /// The prior: a model file that may be wrong.
     #[arg(long, value_name = "FILE", required_unless_present = "earlier")]
     prior: Option<PathBuf>,
-    /// Continue an earlier learning with recent flights (--log): the folder of a learning, or of a
-    /// model with its policy, such as params/x8/learned. Its flights are used again if they exist,
-    /// and its policy is trained further; the folder is not changed.
+    /// Continue an earlier run with recent flights (--log): the output folder of that run, or a folder
+    /// with a model and its policy, such as params/x8/learned. Its flights are used again if they
+    /// exist, and its policy is trained further; the folder is not changed.
     #[arg(long = "continue", value_name = "DIR", requires = "logs", conflicts_with_all = ["prior", "collect", "algorithm"])]
     earlier: Option<PathBuf>,
-    /// With --continue: part of all samples that the recent flights make up; 1 forgets the earlier ones.
+    /// With --continue: fraction of the samples that come from the recent flights; 1 ignores the earlier flights.
     #[arg(long, value_name = "PART", default_value_t = 0.5, conflicts_with = "prior", value_parser = share)]
     recent_share: f64,
-    /// Fly the flights to learn from in JSBSim.
+    /// Fly the training flights in JSBSim.
     #[arg(long, conflicts_with = "logs", required_unless_present = "logs")]
     collect: bool,
     /// Learn from these flight logs instead; no rounds are flown.
     #[arg(long = "log", value_name = "LOG", num_args = 1..)]
     logs: Vec<PathBuf>,
-    /// Folder of all outputs; a learning found there is resumed.
+    /// Folder of all outputs; an interrupted run found there is resumed.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Controller of the first flights, half of the actions random, as in `greylag collect`. Without it all actions of the
-    /// first flights are random.
+    /// Controller of the first flights, with half of the actions random, as in `greylag collect`. Without a controller all
+    /// actions of the first flights are random.
     #[arg(long, value_enum, value_name = "NAME", requires = "collect")]
     explorer: Option<Explorer>,
-    /// Rounds of flights planned through the model learned so far [default: the budget's].
+    /// Rounds of flights planned with the model learned so far [default: by --budget].
     #[arg(long, conflicts_with = "logs", value_parser = clap::value_parser!(u32).range(0..=20))]
     rounds: Option<u32>,
     /// Training algorithm of the policy.
     #[arg(long, default_value = "analytic", value_enum)]
     algorithm: Algorithm,
-    /// How much work: quick, standard (minutes of two cores) or paper (the paper's numbers).
+    /// Amount of computation: quick, standard (minutes on two cores) or paper (the paper's numbers).
     #[arg(long, default_value = "standard", value_enum)]
     budget: Budget,
     /// Coefficients of the prior that are learned with the residual: full names, `all`, or `none`.
     #[arg(long, num_args = 1.., value_delimiter = ',', default_value = "all", value_name = "NAME")]
     trainable: Vec<String>,
-    /// With --log: ignore the widths of the prior's coefficients, for a prior whose numbers are guesses.
+    /// With --log: ignore the prior standard deviations of the coefficients, for a prior whose numbers are guesses.
     #[arg(long, conflicts_with = "collect")]
     from_scratch: bool,
     /// Seed of all random draws.
@@ -83,15 +83,15 @@ pub struct Arguments {
     /// Folder that holds NAME/NAME.xml of the aircraft that flies in JSBSim.
     #[arg(long, value_name = "DIR", requires_all = ["aircraft", "collect"])]
     aircraft_dir: Option<PathBuf>,
-    /// Name of that aircraft [default: the X8].
+    /// Name of the aircraft that flies in JSBSim [default: the X8].
     #[arg(long, value_name = "NAME", requires = "collect")]
     aircraft: Option<String>,
-    /// Hide an effect in that aircraft (may be repeated), as in `greylag collect`.
+    /// Hide an effect in the simulated aircraft (may be repeated), as in `greylag collect`.
     #[arg(long, value_name = "ID=AMPLITUDE", allow_hyphen_values = true, requires = "collect")]
     hide: Vec<String>,
 }
 
-/// Runs the stages of the learning. Stages that are done are skipped.
+/// Runs the stages of `greylag learn`. Stages that are done are skipped.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let stop = Interruption::watch()?;
     let prior = GreyBox::load(&shipped(&arguments.prior_file()?))?;
@@ -148,7 +148,7 @@ impl Arguments {
         Ok(inputs.stages())
     }
 
-    /// The file of the prior, or of the model of the earlier learning.
+    /// The file of the prior, or of the model of the earlier run.
     fn prior_file(&self) -> Result<PathBuf> {
         match (&self.prior, &self.earlier) {
             (Some(prior), _) => Ok(prior.clone()),
@@ -157,7 +157,7 @@ impl Arguments {
         }
     }
 
-    /// Results of the earlier learning in `folder` from which this one continues.
+    /// Results of the earlier run in `folder` from which this run continues.
     fn recent(&self, folder: &Path) -> Result<Recent> {
         let policy = shipped(&flying(folder)?.join(plan::POLICY));
         if !policy.exists() {
@@ -177,7 +177,7 @@ impl Arguments {
         Ok(Recent { flights, policy, logs: self.logs.clone(), share: self.recent_share })
     }
 
-    /// Hashes of a learning's input files: prior, airframe, logs, the policy from which it
+    /// Hashes of the inputs of this run: prior, airframe, logs, and the policy from which it
     /// continues.
     fn inputs(&self, prior: &GreyBox) -> Result<Vec<String>> {
         let mut hashes = vec![prior.sha256.clone(), format!("{:?}", prior.airframe)];
@@ -288,7 +288,8 @@ fn worth(reached: &[Reached], options: &str) -> String {
     }
 }
 
-/// The folder of model and policy of a learning: the folder of its controller if there is one, else `folder` itself.
+/// The folder with the model and the policy of an earlier run: its subfolder of the controller if there is one, else
+/// `folder` itself.
 fn flying(folder: &Path) -> Result<PathBuf> {
     let places = [folder.join(controller::CONTROLLER), folder.to_owned()];
     let place = places.into_iter().find(|place| shipped(&place.join("model.toml")).exists());

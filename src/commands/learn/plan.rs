@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use super::budget::{Algorithm, Budget};
 use crate::commands::collect::Explorer;
 
-/// Folder of the flights, below that of a learning.
+/// Folder of the flights, below the output folder of `greylag learn`.
 pub const FLIGHTS: &str = "flights";
-/// Folder of the last model, below that of a learning.
+/// Folder of the last model, below the output folder of `greylag learn`.
 pub const MODEL: &str = "model";
-/// Folder of the policy, below that of a learning.
+/// Folder of the policy, below the output folder of `greylag learn`.
 pub const POLICY: &str = "policy";
 
 /// Source of the flights.
@@ -25,16 +25,16 @@ pub enum Source {
     },
     /// Recorded logs at these paths.
     Logs(Vec<PathBuf>),
-    /// Recent logs with which an earlier learning is continued.
+    /// Recent logs with which an earlier run is continued.
     Recent(Recent),
 }
 
-/// Results of an earlier learning from which this one continues.
+/// Results of an earlier run from which this run continues.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recent {
-    /// Folder of the earlier learning's flights; `None` if there is none.
+    /// Folder of the earlier run's flights; `None` if there is none.
     pub flights: Option<PathBuf>,
-    /// Folder of the earlier learning's policy.
+    /// Folder of the earlier run's policy.
     pub policy: PathBuf,
     /// Paths of the logs.
     pub logs: Vec<PathBuf>,
@@ -55,7 +55,7 @@ pub struct Inputs<'a> {
     pub rounds: u32,
     /// Coefficients of the prior that are learned. An empty list freezes the prior.
     pub trainable: &'a [String],
-    /// Whether the widths of the coefficients are ignored.
+    /// Whether the prior standard deviations of the coefficients are ignored.
     pub from_scratch: bool,
     /// Training algorithm of the policy.
     pub algorithm: Algorithm,
@@ -65,7 +65,7 @@ pub struct Inputs<'a> {
     pub seed: u32,
 }
 
-/// One stage of a learning.
+/// One stage of `greylag learn`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stage {
     /// Description of the stage's result.
@@ -109,7 +109,7 @@ impl Inputs<'_> {
         stages
     }
 
-    /// The folder of the model that plans `round`, or of the last model.
+    /// The folder of the model that plans `round`. `None` stands for the last model.
     fn folder(&self, round: Option<u32>) -> PathBuf {
         match round {
             Some(round) => self.out.join(format!("{MODEL}-{round}")),
@@ -142,7 +142,7 @@ impl Inputs<'_> {
         Stage { what: format!("{episodes} flights {how}"), line: line.0 }
     }
 
-    /// The training of the model that plans `round`, or of the last model.
+    /// The stage that trains the model that plans `round`. `None` stands for the last model.
     fn model(&self, round: Option<u32>) -> Stage {
         let sizes = self.budget.sizes();
         let updates = round.map_or(sizes.updates, |_| sizes.passing_updates);

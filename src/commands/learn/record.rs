@@ -1,4 +1,4 @@
-//! Record of a learning's progress on disk. An interrupted learning resumes from the record.
+//! Record of the progress of `greylag learn` on disk. An interrupted run resumes from the record.
 
 use std::path::{Path, PathBuf};
 
@@ -37,7 +37,7 @@ pub struct Done {
     pub seconds: f64,
 }
 
-/// The record of a learning in its folder.
+/// The record in the output folder of `greylag learn`.
 #[derive(Debug)]
 pub struct Record {
     path: PathBuf,
@@ -45,11 +45,11 @@ pub struct Record {
 }
 
 impl Record {
-    /// Opens the record in `folder` of the learning with these `stages` and `inputs` (hashes of its input files). If
-    /// there is no record, an empty one is written before anything is flown.
+    /// Opens the record in `folder` of a run with these `stages` and `inputs` (hashes of its input files). If there is no
+    /// record, an empty one is written before anything is flown.
     ///
     /// # Errors
-    /// If the folder holds another learning or flights without a record, or cannot be read or written.
+    /// If the folder holds the record of another run or flights without a record, or cannot be read or written.
     pub fn open(folder: &Path, stages: &[Stage], inputs: &[String]) -> Result<Record> {
         let path = folder.join(RECORD);
         let lines = stages.iter().map(|s| s.command() + "\n").collect::<String>();
@@ -117,7 +117,7 @@ mod tests {
         let stages = [stage("one"), stage("two")];
         let open =
             |stages: &[Stage], prior: &str| Record::open(folder.path(), stages, &[prior.into()]);
-        // a learning that was interrupted in its first stage keeps its folder too
+        // a run that was interrupted in its first stage has an empty record
         open(&stages, "p").unwrap();
         assert!(open(&stages, "q").unwrap_err().to_string().contains("another --out"));
         open(&stages, "p").unwrap().add(&stages[0], 1.5).unwrap();

@@ -14,7 +14,7 @@ use crate::link::signing::Key;
 pub struct Make {
     /// New file for the key: 64 hexadecimal digits, readable by its owner alone.
     file: PathBuf,
-    /// Make it of a passphrase, read from standard input, as QGroundControl and MAVProxy do (SHA-256); otherwise it is random.
+    /// Derive the key from a passphrase on standard input, as QGroundControl and MAVProxy do (SHA-256) [default: a random key].
     #[arg(long)]
     passphrase: bool,
 }

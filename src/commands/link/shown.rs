@@ -25,7 +25,7 @@ pub(super) fn latency(real: &Real, out: &mut dyn Write) {
     }
 }
 
-/// Prints the part of the controller's delay margin that the link leaves.
+/// Prints how much of the controller's delay margin the delay of the link leaves.
 pub(super) fn delay(real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
     if let Some(words) = real.delay_words() {
         print_to!(out, "\ndelay       {words}");

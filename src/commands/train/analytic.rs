@@ -80,7 +80,7 @@ pub fn climb(
     Ok(Some(Arc::new(trainer.actor()?)))
 }
 
-/// Learns the value function of `actor` in `world`; `None` if interrupted.
+/// Fits two critics to the returns of `actor` in the environment `world`. `None` if interrupted.
 ///
 /// # Errors
 /// If a parameter is no longer finite.

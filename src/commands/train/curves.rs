@@ -113,7 +113,7 @@ fn training(folder: &Path) -> Result<Training> {
     let mut read = Vec::new();
     for (seed, folder) in seeds {
         let points = learning_curve::read(&folder.join(CURVE))?;
-        // a folder of one seed does not say which
+        // the folder of a training with one seed does not state this seed
         let seed = seed.map_or("–".into(), |seed| seed.to_string());
         if !points.is_empty() {
             read.push((seed, points));

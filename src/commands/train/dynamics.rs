@@ -44,7 +44,7 @@ pub struct Arguments {
     prior: PathBuf,
     #[command(flatten)]
     flights: FlightArguments,
-    /// A model with the true coefficients, where they are known: displayed beside the learned ones.
+    /// A model with the true coefficients, if they are known; they are displayed beside the learned ones.
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
     /// Leave the prior's coefficients as they are (the default).
@@ -53,60 +53,60 @@ pub struct Arguments {
     /// Coefficients to learn with the residual: full names (effect.name, rigid_body.jxz_kgm2) or `all`.
     #[arg(long, num_args = 1.., value_delimiter = ',', value_name = "NAME")]
     trainable: Vec<String>,
-    /// Step through time by this scheme and not the prior's: jsbsim for flights of the simulator.
+    /// Integrator in place of the prior's: jsbsim for flights of the simulator.
     #[arg(long, value_parser = ["rk4", "jsbsim"])]
     integrator: Option<String>,
-    /// The loss: scaled (the paper's) or plain (x_c = 1, absolute penalty: APHYNITY's; PhIHP's with
-    /// --freeze).
+    /// Loss: scaled, as in the paper, or plain (x_c = 1 and an absolute penalty, as in APHYNITY, and with
+    /// --freeze as in PhIHP).
     #[arg(long, default_value = "scaled", value_parser = ["scaled", "plain"])]
     loss: String,
-    /// Count each rollout by 1/(e² + FLOOR²), e being how far the prior is off at its end, in root mean
-    /// squares: the residual is then as good where the prior errs little. With `inf` all count alike,
-    /// as in the paper (and by default with --loss plain).
+    /// Weight each rollout by 1/(e² + FLOOR²), where e is the prior's error at its end relative to the
+    /// rms over the rollouts: rollouts with small errors of the prior then count more. With `inf` all
+    /// weights are equal, as in the paper (the default with --loss plain).
     #[arg(long, value_name = "FLOOR")]
     floor: Option<f64>,
     /// Units of the residual's hidden layers.
     #[arg(long, value_delimiter = ',', default_values_t = [64, 64])]
     hidden: Vec<usize>,
-    /// Steps of a rollout; several share the updates in turn (a curriculum) [default: 20; 200 where a log has fewer than 100
-    /// samples a second].
+    /// Steps of a rollout; several lengths are used in turn, each for an equal part of the updates (a curriculum)
+    /// [default: 20; 200 if a log has fewer than 100 samples per second].
     #[arg(long, value_delimiter = ',')]
     steps: Vec<usize>,
     /// Rollouts in a minibatch.
     #[arg(long, default_value_t = 64)]
     batch: usize,
-    /// Updates of the training in all.
+    /// Total number of updates.
     #[arg(long, default_value_t = 20_000)]
     updates: u64,
     /// Learning rate at the start.
     #[arg(long, default_value_t = 3e-3)]
     rate: f64,
-    /// Learning rate of the prior's coefficients, in the rates they make: 0 holds them where they start
-    /// (the default after equation error; else 0.003).
+    /// Initial learning rate of the prior's coefficients; 0 keeps their initial values [default: 0.003 with
+    /// --start as-given and --joint gradient, else 0].
     #[arg(long)]
     prior_rate: Option<f64>,
-    /// Where the trained coefficients start: where a robust regression puts them, or as-given, as in the
-    /// paper.
+    /// Initial values of the trained coefficients: from a robust regression (equation-error), or as-given,
+    /// as in the paper.
     #[arg(long, default_value = "equation-error", value_parser = ["as-given", "equation-error"])]
     start: String,
-    /// With --start as-given, how the coefficients are learned along with the residual: by the
-    /// gradient of the rollouts (the paper's), by projection (every 500 updates the part of the
-    /// residual in the prior's span moves into its coefficients, outliers such as a stall weighted
-    /// down), or least-squares (likewise, all samples weighted alike).
+    /// With --start as-given, method by which the coefficients are learned along with the residual:
+    /// gradient of the rollouts (as in the paper), projection (every 500 updates, the part of the residual
+    /// that the prior can represent moves into its coefficients; outliers such as a stall have a lower
+    /// weight), or least-squares (the same with equal weights).
     #[arg(long, default_value = "gradient", value_enum)]
     joint: Joint,
-    /// With --log: ignore the widths of the prior's coefficients, for a prior whose numbers are
-    /// guesses. Else a coefficient is weighted toward its value by its width (15 % where none is
-    /// stated), and one of zero without a width is held.
+    /// With --log: ignore the prior standard deviations of the coefficients, for a prior whose numbers
+    /// are guesses. Without this option they are used (15 % if none is stated), and a coefficient of zero
+    /// without a standard deviation is fixed.
     #[arg(long)]
     from_scratch: bool,
     /// λ0 of the penalty's weight 1/λ.
     #[arg(long, default_value_t = 1.0)]
     lambda: f64,
-    /// τ, by which λ grows an update, times the normalised loss.
+    /// Factor τ: at each update, λ grows by τ times the normalised loss.
     #[arg(long, default_value_t = 0.02)]
     tau: f64,
-    /// Seed of the residual's start and of the minibatches.
+    /// Seed of the initial residual and of the minibatches.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Folder for model, checkpoint and scores; a training found there is resumed.
@@ -114,7 +114,7 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-/// Name of the way in which coefficients are trained with the residual.
+/// Method by which coefficients are trained together with the residual.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum Joint {
     Gradient,
@@ -148,7 +148,7 @@ struct Document<'a> {
     notes: Vec<String>,
 }
 
-/// Trains, prints the result, writes the model.
+/// Trains the model, prints the result and writes the model's files.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(learn(arguments, &Interruption::watch()?)?.into())
 }
@@ -259,8 +259,8 @@ impl Arguments {
         Ok(prior)
     }
 
-    /// `prior`, with the stated or default width of each coefficient as its prior. It is unchanged with
-    /// `--from-scratch`, or if rounds of `greylag collect` or recent flights are used.
+    /// `prior`, with a prior standard deviation for each coefficient: the stated one, else 15 % of the value. The model is
+    /// unchanged with `--from-scratch`, or if rounds of `greylag collect` or recent flights are used.
     fn narrowed(&self, prior: GreyBox) -> GreyBox {
         if !self.flights.is_logs_alone() || self.from_scratch {
             return prior;
@@ -270,7 +270,7 @@ impl Arguments {
     }
 }
 
-/// `trainer`, resumed from the checkpoint if there is one.
+/// `trainer`, resumed from the checkpoint if there is one. Prints the coefficients that the flights do not determine.
 fn begun(mut trainer: Trainer, kept: &Path) -> Result<Trainer> {
     for name in trainer.unseen() {
         eprintln!("the flights do not show {name} apart from others: it stays near its prior");

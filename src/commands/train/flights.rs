@@ -21,7 +21,7 @@ const HELD_OUT_PART: f64 = 0.2;
 /// Largest number of copies of a recent flight in the training data.
 const MOST_COPIES: f64 = 50.0;
 
-/// Where flights come from.
+/// Options that select the flights.
 #[derive(clap::Args)]
 pub struct FlightArguments {
     /// Flight logs: CSV, PX4 ULog, ArduPilot .bin, MAVLink .tlog or ROS 2 bag (.mcap), distinguished by content.
@@ -29,14 +29,14 @@ pub struct FlightArguments {
     logs: Vec<PathBuf>,
     #[command(flatten)]
     reading: Reading,
-    /// Folders that `greylag collect` wrote; every round below them is read, its states as they are.
+    /// Folders that `greylag collect` wrote; every round below them is read, and its states are not reconstructed.
     #[arg(long = "collect", num_args = 1..)]
     folders: Vec<PathBuf>,
     /// Logs of recent flights, which outweigh the others; the last fifth of each is for validation and is not used for
     /// training.
     #[arg(long = "recent", value_name = "LOG", num_args = 1..)]
     recent: Vec<PathBuf>,
-    /// Part of all samples that recent flights make up, by being repeated; 1 leaves the others out.
+    /// Fraction of the training samples that come from recent flights, which are repeated for this; 1 omits the other flights.
     #[arg(long, value_name = "PART", default_value_t = 0.5, requires = "recent", value_parser = share)]
     recent_share: f64,
 }
@@ -127,8 +127,8 @@ impl FlightArguments {
         Ok(all)
     }
 
-    /// Joins the tracks `others` and the recent flights. Recent flights are repeated to make up their share of all
-    /// samples.
+    /// Joins the tracks `others` and the recent flights. Recent flights are repeated until they make up the requested
+    /// fraction of all samples.
     fn with_recent(
         &self,
         others: Vec<Track>,
@@ -166,7 +166,7 @@ impl FlightArguments {
     }
 }
 
-/// Parses the value of an option that is a share of all samples.
+/// Parses the value of an option that is a fraction of all samples.
 ///
 /// # Errors
 /// If it is not a number above 0 and at most 1.
@@ -178,7 +178,7 @@ pub fn share(text: &str) -> Result<f64, String> {
 /// A sample: state, measured controls, altitude (m).
 type Row = (State, Controls, f64);
 
-/// Warning for a flight that was sampled more slowly than the model steps.
+/// Warning for a flight whose sample time exceeds the model's time step. `None` for other flights.
 ///
 /// # Errors
 /// If its sample time exceeds `SLOWEST_S`.

@@ -23,7 +23,7 @@ pub struct Arguments {
 
 #[derive(clap::Subcommand)]
 enum What {
-    /// Learn a dynamics model: what a prior lacks, and its coefficients where asked for.
+    /// Learn a dynamics model: a residual for what the prior lacks, and coefficients of the prior if requested.
     Dynamics(Box<dynamics::Arguments>),
     /// Train a policy in a model, or in JSBSim.
     Policy(Box<policy::Arguments>),

@@ -36,10 +36,10 @@ pub struct Arguments {
     /// Where to train: model:DIR, model:FILE.toml, or jsbsim.
     #[arg(long = "env", value_name = "ENV")]
     environment: Place,
-    /// How: td3, or analytic (the slope of the reward through the model, then critics of the actor found).
+    /// Algorithm: td3, or analytic (policy gradient through the model, then critics fitted to the resulting actor).
     #[arg(long, default_value = "td3", value_parser = ["td3", "analytic"])]
     algorithm: String,
-    /// Updates of the critics of the actor that the analytic policy gradient found.
+    /// Updates of the critics, which are fitted after the analytic policy gradient.
     #[arg(long, default_value_t = ValuationRecipe::default().updates, value_parser = clap::value_parser!(u64).range(1..))]
     valuation: u64,
     /// Updates of the analytic policy gradient.
@@ -54,22 +54,22 @@ pub struct Arguments {
     /// Learning rate of the analytic policy gradient at the start.
     #[arg(long, default_value_t = AnalyticRecipe::default().rate)]
     climb: f64,
-    /// Errors of roll and pitch (rad) below which the analytic policy gradient rounds the reward off.
+    /// Errors of roll and pitch (rad) below which the analytic policy gradient smooths the reward.
     #[arg(long, default_value_t = AnalyticRecipe::default().rounding)]
     rounding: f64,
-    /// Price of a change of a command from step to step, by its square, in the analytic policy gradient.
+    /// Weight of the squared change of the commands from step to step in the analytic policy gradient.
     #[arg(long, default_value_t = AnalyticRecipe::default().effort)]
     effort: f64,
-    /// Aircraft imagined at once.
+    /// Aircraft simulated at once in the model.
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u64).range(1..=4096))]
     instances: u64,
     /// Number of policies to train, with consecutive seeds from --seed on; they share the cores.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
-    /// Seed of the first.
+    /// Seed of the first policy.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Steps of the environment, all aircraft together; each has one update.
+    /// Steps of the environment, all aircraft together; there is one update per step.
     #[arg(long, default_value_t = 700_000)]
     steps: u64,
     /// Steps of random actions at the start.
@@ -91,7 +91,7 @@ pub struct Arguments {
     /// Rows of a minibatch.
     #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u64).range(1..))]
     batch: u64,
-    /// Rate at which the target networks follow.
+    /// Rate τ of the soft update of the target networks.
     #[arg(long, default_value_t = 0.05)]
     tau: f64,
     /// Learning rate of actor and critics.
@@ -100,17 +100,17 @@ pub struct Arguments {
     /// Discount factor per step.
     #[arg(long, default_value_t = 0.99)]
     discount: f64,
-    /// Standard deviation of the noise that explores.
+    /// Standard deviation of the exploration noise.
     #[arg(long, default_value_t = 0.1)]
     exploration: f64,
-    /// Standard deviation of the noise that smooths the target policy.
+    /// Standard deviation of the noise that smooths the target policy of TD3.
     #[arg(long, default_value_t = 0.2)]
     smoothing: f64,
-    /// Part of the targets that lie in the hard corners, 0 to 1; 0 is the paper's.
+    /// Fraction of the targets that lie in the hard corners, 0 to 1; 0 as in the paper.
     #[arg(long, default_value_t = 0.0)]
     corners: f64,
-    /// Models, drawn from the widths of the coefficients of --env, in which the analytic policy gradient flies (domain
-    /// randomisation); 0: the model itself. The critics are those of the model itself.
+    /// Models, drawn from the prior distributions of the coefficients of --env, in which the analytic policy gradient flies
+    /// (domain randomisation); 0: the model itself. The critics are always fitted in the model itself.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4096))]
     draws: u64,
     /// Steps between two evaluations, flown in the training's simulation.
@@ -143,7 +143,7 @@ impl FromStr for Place {
     }
 }
 
-/// Trains, prints the curve, writes the best policy.
+/// Trains the policies, prints their learning curves and writes the best policy of each seed.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(learn(arguments, &Interruption::watch()?)?.into())
 }

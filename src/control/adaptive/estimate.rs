@@ -1,8 +1,10 @@
 //! Control power, damping and stiffness of one axis of an unknown aircraft, estimated in flight.
 //!
 //! The method is recursive least squares with a prior (a Kalman filter over constants, K. J. Åström, B. Wittenmark,
-//! "Adaptive Control", 2nd ed., 1995, section 2.2) on ω̇ = g u − a ω − m α̂. Both sides are differentiated and pass the
-//! same low-pass filters. The differentiation removes constant and slow influences (trim, wind, asymmetry).
+//! "Adaptive Control", 2nd ed., 1995, section 2.2). The regression is ω̇ = b u − a ω − m α̂, with the body rate ω, the command
+//! u, the estimated angle of attack α̂, the control power b, the damping a and the stiffness m. Both sides are
+//! differentiated and pass the same low-pass filters. The differentiation removes constant and slow influences (trim, wind,
+//! asymmetry).
 
 use greylag_model::STEP;
 
@@ -10,15 +12,17 @@ use greylag_model::STEP;
 const CORNER: f64 = 20.0;
 /// Corner frequencies of two first-order lags that approximate an unknown servo and an unknown delay, rad/s.
 const SERVO: [f64; 2] = [25.0, 40.0];
-/// Standard deviation of the regression's constant error, 1/s². Its product with V/g at cruise (s) has the unit of the
-/// regression's left side.
+/// Standard deviation of the part of the regression's error that does not depend on the signals, 1/s². Its product with V/g at
+/// cruise (s) has the unit of the regression's left side.
 const NOISE: f64 = 4.0;
-/// Standard deviation of the regression's relative error. It covers servos and delays that differ from the assumed ones.
+/// Standard deviation of the regression's relative error, as a fraction of the left side. It covers servos and delays that
+/// differ from the assumed ones.
 const SHARE: f64 = 0.2;
 /// Growth rate of each variance by forgetting, as a fraction of the prior variance, 1/s.
 const AGEING: f64 = 1e-3;
 
-/// Prior of control power, damping and stiffness of an axis, in units of (g/V)², g/V and (g/V)² at the cruise airspeed V.
+/// Prior of control power, damping and stiffness of an axis. The units are (g/V)², g/V and (g/V)², with the standard gravity g
+/// and the cruise airspeed V.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Prior {
     pub mean: [f64; 3],
@@ -31,7 +35,7 @@ pub(super) struct Prior {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Estimate {
     prior: Prior,
-    /// Power, damping, stiffness, in the prior's units.
+    /// Estimated control power, damping and stiffness, in the prior's units.
     pub theta: [f64; 3],
     covariance: [[f64; 3]; 3],
     servo: [f64; 2],
@@ -43,9 +47,9 @@ pub(super) struct Estimate {
 pub(super) struct Seen {
     /// Body rate, rad/s.
     pub rate: f64,
-    /// Command in force, −1..1, positive for positive rates.
+    /// Command that acts at this instant, −1..1. A positive command accelerates the axis to positive rates.
     pub command: f64,
-    /// Estimate of the axis's incidence angle, rad. Zero for an axis without stiffness.
+    /// Estimated change of the angle of attack, rad. Zero for the roll axis, which has no stiffness.
     pub incidence: f64,
     /// Airspeed divided by the cruise airspeed.
     pub speed: f64,
@@ -85,7 +89,8 @@ impl Estimate {
         self.learn(x, bend * time * time, NOISE * time);
     }
 
-    /// One step of the least squares: `y` = θ·x with an error of `noise`.
+    /// One step of recursive least squares for `y` = θ·`x`. The standard deviation of the error is `noise`, to which the relative
+    /// error `SHARE` is added.
     fn learn(&mut self, x: [f64; 3], y: f64, noise: f64) {
         let dot = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let spread: [f64; 3] = std::array::from_fn(|k| dot(&self.covariance[k], &x));
@@ -109,7 +114,8 @@ impl Estimate {
 mod tests {
     use super::*;
 
-    /// Power, in units of (g/V)², that is estimated for ω̇ = g u − a ω with V/g = 2 s after five seconds of a square wave.
+    /// Control power estimated after five seconds of a square-wave command, in units of (g/V)². The axis obeys
+    /// ω̇ = `power` · u − `damping` · ω, and V/g is 2 s.
     fn found(power: f64, damping: f64) -> f64 {
         let prior = Prior { mean: [400.0, 15.0, 0.0], sd: [250.0, 10.0, 1e-6], least: 25.0 };
         let mut estimate = Estimate::new(prior);

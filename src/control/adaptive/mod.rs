@@ -1,9 +1,10 @@
 //! Adaptive attitude hold for an aircraft without a model. The gains of its cascaded loops are divided by control powers
 //! that are estimated in flight. The controller needs two facts: the cruise airspeed, and whether the aircraft has a rudder.
 //!
-//! Times and rates are scaled by V/g at the cruise airspeed V (Froude scaling). One set of gains therefore serves toys
-//! and light aircraft. The priors are medians of a distribution of aircraft (`greylag aircraft draw`), except the mean of the
-//! roll power. The gains were tuned on aircraft drawn from this distribution, see `docs/validation/any-aircraft.md`.
+//! Times and rates are scaled by V/g at the cruise airspeed V (Froude scaling). One set of gains therefore serves small
+//! models and light aircraft. The prior means are medians over a distribution of aircraft (`greylag aircraft draw`), except
+//! the mean of the roll control power. The gains were tuned on aircraft drawn from this distribution, see
+//! `docs/validation/any-aircraft.md`.
 
 mod estimate;
 
@@ -18,10 +19,11 @@ use greylag_physics::{Airframe, Command};
 const ROLL: Prior = Prior { mean: [400.0, 15.0, 0.0], sd: [250.0, 10.0, 1e-6], least: 25.0 };
 /// Prior of the pitch axis.
 const PITCH: Prior = Prior { mean: [300.0, 10.0, 40.0], sd: [200.0, 7.0, 50.0], least: 10.0 };
-/// Lift slope −Z_α, in g/V. It is nearly the same for all aircraft, because they cruise at about half the lift of the stall.
+/// Lift slope −Z_α, in g/V. It is nearly the same for all aircraft, because they cruise at about half of the largest lift
+/// coefficient.
 const LIFT_SLOPE: f64 = 9.0;
 
-/// Gains from the errors in roll and in pitch to the commanded rates, 1/s.
+/// Gains from the roll error to the commanded roll rate and from the pitch error to the commanded pitch rate, 1/s.
 const ATTITUDE: [f64; 2] = [3.0, 2.4];
 /// Bandwidth of the rate loops, 1/s.
 const RATE: f64 = 6.0;
@@ -29,19 +31,22 @@ const RATE: f64 = 6.0;
 const INTEGRAL: f64 = 3.5;
 /// Limit of the integral's part of the command, where 1 is full travel.
 const INTEGRAL_MOST: f64 = 0.8;
-/// Fraction of the estimated stiffness that is fed forward.
+/// Fraction of the estimated stiffness that is used in the feed-forward.
 const STIFFNESS_SHARE: f64 = 0.7;
-/// Largest rates of the reference in roll and pitch, rad/s, and the time constant of its approach to the target, s.
+/// Largest roll and pitch rates of the reference attitude, rad/s. `ROUNDING` is the time constant with which the reference
+/// approaches the target, s.
 const REFERENCE: [f64; 2] = [0.9, 0.5];
 const ROUNDING: f64 = 0.35;
 
-/// Throttle law: throttle at cruise (0..1), gain on the relative airspeed error, gain on the integral of this error over
-/// time in units of V/g, gain on the sine of the pitch angle.
+/// Coefficients of the throttle law: throttle at cruise (0..1), gain on the relative airspeed error, gain on the time
+/// integral of this error (time in units of V/g), gain on the sine of the pitch angle.
 const THROTTLE: [f64; 4] = [0.4, 1.5, 0.8, 1.2];
-/// Fractions of the cruise airspeed between which the nose is lowered progressively, by up to [`NOSE_DOWN`] (rad).
+/// Airspeeds as fractions of the cruise airspeed. Below the first, the nose is lowered progressively. At the second, it is
+/// [`NOSE_DOWN`] (rad) below the horizon.
 const SLOW: [f64; 2] = [0.80, 0.65];
 const NOSE_DOWN: f64 = 0.15;
-/// Rudder gain on the part of the yaw rate that exceeds a coordinated turn's, in V/g, and the largest rudder command.
+/// Gain to the rudder command from the difference between the yaw rate and that of a coordinated turn, in V/g.
+/// `RUDDER_MOST` is the largest rudder command.
 const YAW_DAMPING: f64 = 0.25;
 const RUDDER_MOST: f64 = 0.5;
 
@@ -51,17 +56,17 @@ const RUDDER_MOST: f64 = 0.5;
 pub struct Belief {
     /// Roll acceleration at full aileron, rad/s².
     pub roll_power: f64,
-    /// Decay of the roll rate, 1/s.
+    /// Roll damping −L_p: rate of decay of the roll rate, 1/s.
     pub roll_damping: f64,
     /// Pitch acceleration at full elevator, rad/s².
     pub pitch_power: f64,
-    /// Decay of the pitch rate at a constant incidence, 1/s.
+    /// Pitch damping −M_q: rate of decay of the pitch rate at a constant angle of attack, 1/s.
     pub pitch_damping: f64,
-    /// Nose-down pitch acceleration per angle of attack, 1/s².
+    /// Pitch stiffness −M_α: nose-down pitch acceleration per angle of attack, 1/s².
     pub pitch_stiffness: f64,
 }
 
-/// One axis: its estimate and the integral of its loop.
+/// Estimate and rate-loop integral of one axis.
 #[derive(Clone, Debug)]
 struct Axis {
     estimate: Estimate,
@@ -73,8 +78,8 @@ impl Axis {
         Axis { estimate: Estimate::new(prior), integral: 0.0 }
     }
 
-    /// The command (−1..1) that drives `rate` to `wanted` (rad/s). `feed` maps damping (1/s) and stiffness (1/s²) to the
-    /// acceleration that holds the wanted rate (rad/s²).
+    /// The command (−1..1) that drives `rate` to the setpoint `wanted` (rad/s). `feed` maps damping (1/s) and stiffness (1/s²) to
+    /// the acceleration (rad/s²) that is needed to hold the setpoint. `speed` and `time` are those of `Seen`.
     fn command(
         &mut self,
         [rate, wanted]: [f64; 2],
@@ -136,7 +141,8 @@ impl Adaptive {
         }
     }
 
-    /// Moves the reference towards `wanted` (roll and pitch, rad). Returns the reference (rad) and its rates (rad/s).
+    /// Moves the reference towards the setpoint `wanted` (roll and pitch, rad). Returns the reference (rad) and its rates
+    /// (rad/s). The reference starts at the attitude `now`.
     fn follow(&mut self, now: [f64; 2], wanted: [f64; 2]) -> [[f64; 2]; 2] {
         let mut reference = self.reference.unwrap_or(now);
         let mut rates = [0.0; 2];
@@ -164,7 +170,8 @@ impl Adaptive {
     }
 }
 
-/// The commanded roll and pitch, rad. Below the airspeeds of `SLOW` the nose is lowered and the bank reduced.
+/// Roll and pitch setpoints (rad) of the reference. At low airspeed, as `SLOW` defines, the nose is lowered and the bank is
+/// reduced.
 fn wanted(target: &Target, speed: f64) -> [f64; 2] {
     let slow = ((SLOW[0] - speed) / (SLOW[0] - SLOW[1])).clamp(0.0, 1.0);
     let lower = target.pitch * (1.0 - slow) - slow * NOSE_DOWN;

@@ -11,11 +11,13 @@ use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{Airframe, Command};
 use network::{HIDDEN, INPUTS, Network};
 
-/// Largest rates of the reference in roll and pitch, rad/s, and the time constant of its approach to the target, s. The
-/// policy was trained with these values (`params/any/train.py`): they change only with a new training.
+/// Largest roll and pitch rates of the reference attitude, rad/s. `ROUNDING` is the time constant with which the reference
+/// approaches the target, s. The policy was trained with both values (`params/any/train.py`), which therefore change only
+/// with a new training.
 const REFERENCE: [f64; 2] = [0.9, 0.5];
 const ROUNDING: f64 = 0.35;
-/// Limit of the integrals of the attitude errors, rad s, and of the relative airspeed error, s.
+/// Largest magnitude of the integrals of the attitude errors, rad s. `SPEED_INTEGRAL_MOST` is that of the relative airspeed
+/// error, s.
 const INTEGRAL_MOST: f64 = 0.5;
 const SPEED_INTEGRAL_MOST: f64 = 2.0;
 
@@ -55,7 +57,7 @@ impl AnyPolicy {
         })
     }
 
-    /// Inputs of the network in the order used in training, and the policy's state after this step.
+    /// Inputs of the network in the order used in training, and the policy's state with reference and integrals after this step.
     fn see(&self, seen: &Observation, target: &Target) -> ([f64; INPUTS], Memory) {
         let (s, u, mut memory) = (&seen.state, &seen.previous[0], self.memory);
         let time = self.cruise / STANDARD_GRAVITY;

@@ -1,4 +1,4 @@
-//! The last planning tick for display: a sample of its candidates, each simulated with the model.
+//! Display of the last planning tick: a sample of its candidates, each simulated with the model.
 
 use super::rollout::{HORIZON, WIDTH, slewed};
 use super::{Cem, Plan, flown};
@@ -12,7 +12,7 @@ use greylag_physics::actuators::Actuators;
 const SHOWN: usize = 48;
 
 impl Cem {
-    /// The candidates and the chosen plan of the tick that was planned from `seen`. The function integrates some thousand
+    /// The candidates and the chosen plan of the tick that was planned from `seen`. The function integrates several thousand
     /// steps and allocates memory. It is therefore not for use in flight.
     pub(super) fn last_insight(&self, seen: &Observation) -> Insight {
         let all = self.blocks.len() * WIDTH;
@@ -26,7 +26,7 @@ impl Cem {
         }
     }
 
-    /// Roll and pitch (rad) at every step along `plan`. Without a plan, they follow the base controller's commands.
+    /// Roll and pitch (rad) at every step along `plan`. Without a plan, the simulated aircraft is flown by the base controller.
     fn path(&self, seen: &Observation, plan: Option<&Plan>) -> Path {
         let model = &self.model;
         let figures = &model.airframe.actuators;

@@ -18,8 +18,8 @@ impl Cem {
         self.predictions.as_ref().filter(|_| self.settings.disturbance.is_some())
     }
 
-    /// Whether planning may use the model. It may not if the prediction errors exceed `Settings::trust` and do not look
-    /// like gusts, or if the distance from the residual's training data exceeds `Settings::known`.
+    /// Whether planning may use the model. The result is false in two cases: the prediction errors exceed `Settings::trust` and
+    /// do not look like gusts, or the distance from the residual's training data exceeds `Settings::known`.
     pub(super) fn is_trusted(&self, seen: &Observation) -> bool {
         let predicted = match (self.settings.trust, &self.predictions) {
             (Some(most), Some(predictions)) => !predictions.is_wrong(most),

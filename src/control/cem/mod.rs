@@ -26,14 +26,15 @@ use rollout::{Actions, Block, HORIZON, Machine, WIDTH, Worth};
 pub use settings::{Instructions, Settings, Start, Update, Value};
 use surrogate::Surrogate;
 
-/// Number of candidates whose terminal states the critics value. A plane fitted to these values then replaces the critics.
+/// Number of candidates whose terminal states the critics evaluate. A linear function fitted to these values then replaces the
+/// critics.
 const SURVEYED: usize = 128;
 
-/// Number of best candidates of the last iteration that the critics value again.
+/// Number of best candidates of the last iteration that the critics evaluate again.
 const RESCORED: usize = 64;
 
-/// Sideslip that costs a reward of 1 per step where the base controller uses a rudder, rad. The paper's reward (eq. 30)
-/// has no sideslip term. Without this term a roll faster than the rudder can coordinate would cost nothing.
+/// Sideslip that lowers the reward by 1 per step, rad. The term applies only if the base controller uses a rudder. The paper's
+/// reward (eq. 30) has no sideslip term. Without this term a roll faster than the rudder can coordinate would cost nothing.
 const SIDESLIP: f64 = 0.3;
 
 /// The policy, base controller and iLQR planner that a search may use.
@@ -41,7 +42,7 @@ const SIDESLIP: f64 = 0.3;
 pub struct Aids {
     /// The policy that proposes candidates, with its critics.
     pub agent: Option<Agent>,
-    /// The controller that flies unless the search finds a plan whose return is higher by the setting `margin`.
+    /// The controller that flies unless the search finds a plan whose return is higher by `Settings::margin`.
     pub base: Option<Lqi>,
     /// The planner whose plan is added to the candidates.
     pub ilqr: Option<Ilqr>,
@@ -53,7 +54,7 @@ type Action = [f64; 3];
 /// Actions of one candidate at every step of the horizon.
 type Plan = [Action; HORIZON];
 
-/// A plan with its estimated return.
+/// A plan with its estimated return `worth` and the critics' disagreement `doubt` on its terminal value.
 #[derive(Clone, Copy, Debug)]
 struct Valued {
     plan: Plan,
@@ -80,7 +81,7 @@ pub struct Cem {
     blocks: Vec<Block>,
     worth: Vec<Worth>,
     order: Vec<(f32, u32)>,
-    /// Plan of the last tick, `None` if the search's plan was not flown. `age` counts the ticks for which it has been flown.
+    /// Plan of the last tick. `None` if the search's plan was not flown. `age` is the number of ticks for which it has flown.
     last: Option<Plan>,
     age: usize,
     /// With [`Settings::delay`]: the observation and target for which the next tick is planned. `planned_for` is the time
@@ -110,7 +111,7 @@ impl Spent {
     }
 }
 
-/// The base controller with its commands over the horizon.
+/// The base controller with its control law over the horizon.
 #[derive(Clone, Debug)]
 struct Base {
     lqi: Lqi,
@@ -163,7 +164,7 @@ impl Cem {
         let all = self.blocks.len();
         let fitted = self.settings.value == Value::Fitted && self.settings.alpha.is_some();
         self.surrogate = None;
-        // a search that failed may have left its best candidates
+        // an earlier search that failed may have left its best candidates
         self.kept.clear();
         let mut first = self.settings.proposals.div_ceil(WIDTH).min(all);
         self.sample_noise(&mut rng, [0, first]);
@@ -205,8 +206,8 @@ impl Cem {
         Some(mean)
     }
 
-    /// Searches around the base controller's plan. Returns the best plan only if its return exceeds the base's by the margin
-    /// plus the critics' disagreement. The larger disagreement of the two plans counts.
+    /// Searches around the base controller's plan. Returns the best plan only if its return exceeds the base's by more than the
+    /// margin plus the critics' disagreement. The disagreement is the larger one of the two plans.
     fn search_around_base(
         &mut self,
         seen: &Observation,
@@ -282,7 +283,7 @@ impl Cem {
         }
     }
 
-    /// The base controller's command, or the plan's if its return is higher by the margin.
+    /// The base controller's command, or that of the best plan if the plan's return is higher by the margin.
     fn over_base(&mut self, mut base: Base, seen: &Observation, target: &Target) -> Command {
         let begun = Instant::now();
         base.lqi.look_ahead(seen, target, &mut base.ahead);
@@ -346,7 +347,7 @@ impl Controller for Cem {
     }
 
     fn overruled(&mut self, by: &Overruled) {
-        // planning restarts from each observation, but the base controller has integrators that must follow
+        // planning restarts from each observation, but the base controller's integrators must follow the flown command
         if let (None, Some(base)) = (&self.last, &mut self.base) {
             base.lqi.overruled(by);
         }
@@ -387,7 +388,7 @@ impl Controller for Cem {
         if self.last.is_none() || self.age >= self.settings.chunk {
             (self.last, self.age) = (self.search(seen, target), 0);
         }
-        // NaN signals a failure, upon which the caller flies its fallback controller
+        // NaN signals a failure: the caller then flies its fallback controller
         self.last.map_or(LOST, |plan| flown(&plan[self.age]))
     }
 }

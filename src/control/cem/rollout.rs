@@ -31,7 +31,7 @@ pub(super) struct Scene<'a> {
     pub task: &'a Task,
     pub seen: &'a Observation,
     pub target: &'a Target,
-    /// The policy that proposes actions, and whose critics value the terminal state.
+    /// The policy that proposes actions. Its critics evaluate the terminal state.
     pub agent: Option<&'a Agent>,
     /// Weight α of the critics' terminal value, eq. (26). `None` omits the terminal value.
     pub alpha: Option<f64>,
@@ -43,9 +43,9 @@ pub(super) struct Scene<'a> {
     pub disturbance: State,
     /// Law of the base controller. It flies the steps after the plan and commands throttle and rudder during the plan too.
     pub ahead: Option<&'a Ahead>,
-    /// Number of steps without a base controller. The policy flies the steps after the fifth. Without a policy, five steps.
+    /// Number of steps of a rollout with a policy and no base controller. With neither, a rollout has five steps.
     pub steps: usize,
-    /// Sideslip that costs a reward of 1 per step where a rudder is flown, rad.
+    /// Sideslip that lowers the reward by 1 per step, rad. `None` omits the sideslip term.
     pub sideslip: Option<f64>,
 }
 
@@ -54,9 +54,9 @@ pub(super) struct Scene<'a> {
 pub(super) enum Actions {
     /// The block holds the actions.
     Given,
-    /// The policy. The block holds offsets to its actions before the rollout, and the sums after it.
+    /// The policy. The rollout replaces the block's offsets from the policy's actions by the resulting actions.
     Policy,
-    /// The base controller. The block holds offsets to its actions before the rollout, and the sums after it.
+    /// The base controller. The rollout replaces the block's offsets from its actions by the resulting actions.
     Base,
 }
 
@@ -67,9 +67,9 @@ pub(super) struct Worth {
     pub returns: [f32; WIDTH],
     /// Disagreement of the two critics on the terminal value, with the same discount and weight as that value.
     pub doubt: [f32; WIDTH],
-    /// Observation at the terminal state, if the critics or the surrogate value this state.
+    /// Observation at the terminal state, if the critics or the surrogate evaluate this state.
     pub end: [[f32; WIDTH]; OBSERVATIONS],
-    /// The smaller of the critics' values of the terminal state, or the surrogate's value.
+    /// Value of the terminal state: the smaller of the two critics' values, or the surrogate's.
     pub value: [f32; WIDTH],
 }
 
@@ -94,7 +94,7 @@ pub(super) enum Machine {
     Baseline(Units<Base<BASE_FUSED>>),
 }
 
-/// Evaluates two blocks together and thereby loads each network weight once for both.
+/// Lanes of two blocks, which are evaluated together. Each network weight is then loaded once for both.
 #[cfg(target_arch = "x86_64")]
 type Wide = Lanes<32, true, Pair<std::arch::x86_64::__m512>>;
 
@@ -268,7 +268,7 @@ fn given<R: Packed>(blocks: &[Block], step: usize, component: usize) -> R {
     )
 }
 
-/// Returns of up to `R::ROWS` blocks: the plan flies five steps, then the base controller or the policy.
+/// Computes the returns of up to `R::ROWS` blocks. The plan flies five steps, then the base controller or the policy flies.
 #[inline(always)]
 fn rollout<R: Packed>(
     scene: &Scene,
@@ -287,8 +287,8 @@ fn rollout<R: Packed>(
         None if scene.agent.is_some() => scene.steps,
         None => HORIZON,
     };
-    // plain loops, because an iterator that is not inlined is compiled without the vector instructions. Only one call of the
-    // model, because a second inlined copy doubles a compile time of minutes
+    // the loops are plain, because an iterator that is not inlined is compiled without the vector instructions. There is only
+    // one call of the model, because a second inlined copy doubles a compile time of minutes
     let mut step = 0;
     while step < steps {
         let mut chosen = [R::zero(); ACTIONS];
@@ -363,8 +363,8 @@ fn rollout<R: Packed>(
     }
 }
 
-/// `command` with its surfaces limited to the airframe's slew rate from `last`. The pilot applies the same limit. A plan
-/// without this limit oscillates if the channels are also delayed.
+/// `command` with the change of its surfaces since the command `last` limited to the airframe's slew rate. The pilot applies the
+/// same limit. A plan without this limit oscillates if the channels are also delayed.
 #[inline(always)]
 pub(super) fn slewed<R: Real>(
     command: Command<R>,

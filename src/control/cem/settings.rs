@@ -25,13 +25,13 @@ pub enum Start {
     Last,
 }
 
-/// The function that values the terminal states, if the settings include a terminal value.
+/// The function that evaluates the terminal states, if the settings include a terminal value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Value {
-    /// The critics value every candidate.
+    /// The critics evaluate every candidate.
     Critics,
-    /// A plane fitted to the critics' values of the tick's first 128 candidates values the others. The critics value the
-    /// best 64 of the last iteration again. The setting is available only without a base controller.
+    /// The critics evaluate the tick's first 128 candidates. A linear function fitted to these values evaluates the others. The
+    /// critics evaluate the best 64 of the last iteration again. The setting is available only without a base controller.
     Fitted,
 }
 
@@ -89,13 +89,13 @@ pub struct Settings {
     pub ilqr: bool,
     /// Time constant of the disturbance estimate, s. `None` disables the estimate.
     pub disturbance: Option<f64>,
-    /// Largest relative one-step prediction error (root mean square over the last half second) at which plans are made.
-    /// Above it, unless the error looks like gusts, the base controller flies alone, or the policy if there is no base
-    /// controller. One of the two is required. `None` disables the check.
+    /// Largest relative one-step prediction error (root mean square over the last half second) at which plans are made. A
+    /// larger error that looks like gusts is ignored. At any other larger error the base controller flies alone, or the policy
+    /// if there is no base controller. One of the two is required. `None` disables the check.
     pub trust: Option<f64>,
     /// Largest distance from the training data of the model's residual, see
-    /// [`Residual::distance`](greylag_model::Residual::distance), at which plans are made. Within 1 lie 99.9 % of the
-    /// training samples. Beyond the limit the fallback is that of `trust`. `None` disables the check.
+    /// [`Residual::distance`](greylag_model::Residual::distance), at which plans are made. 99.9 % of the training samples have
+    /// a distance of at most 1. Beyond the limit the fallback is that of `trust`. `None` disables the check.
     pub known: Option<f64>,
     /// Vector instruction set of the rollouts.
     pub instructions: Instructions,
@@ -144,7 +144,7 @@ impl Settings {
         ..Settings::POLICY
     };
     /// The hybrid controller with a longer horizon: the policy flies the model from the end of each plan to step 40, where
-    /// the critics value the terminal state. It performs equally well without critics.
+    /// the critics evaluate the terminal state. It performs equally well without critics.
     pub const OVER_POLICY: Settings = Settings {
         population: 64,
         update: Update::Elites(8),
@@ -158,9 +158,9 @@ impl Settings {
     /// The hybrid controller over an LQI. The LQI flies the steps after each plan, which replaces the critics' terminal value.
     /// The steady-state attitude error is zero.
     ///
-    /// The margin corresponds to an attitude error of 0.12° at all steps. Improvements below it are sampling noise, and flying
-    /// them opens the loop of the LQI's integrators. Hard targets settle to 0.04° with a margin of 0.002, and to 0.001° with
-    /// 0.05.
+    /// The margin corresponds to an attitude error of 0.12° at all steps. Smaller improvements are sampling noise. Flying such
+    /// plans would open the loop of the LQI's integrators. Hard targets settle to 0.04° with a margin of 0.002, and to 0.001°
+    /// with 0.05.
     pub const OVER_LQI: Settings = Settings {
         population: 128,
         update: Update::Elites(12),

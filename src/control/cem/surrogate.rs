@@ -1,7 +1,7 @@
-//! Terminal value of low cost: a plane fitted to terminal states that the critics have valued.
+//! Terminal value at low computational cost: a linear function fitted to terminal states that the critics have evaluated.
 //!
-//! The two critics are piecewise linear, and the candidates of one tick end close together. A plane fitted in each tick
-//! therefore approximates them well. The plane needs no training and no file.
+//! The two critics are piecewise linear, and the candidates of one tick end close together. A linear function fitted in each
+//! tick therefore approximates them well. It needs no training and no file.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -9,11 +9,11 @@ use super::rollout::Worth;
 use crate::policy::OBSERVATIONS as N;
 use greylag_num::Real;
 
-/// Ridge regularisation as a fraction of each observation's variance. Without it, terminal states that lie on a plane would not
-/// determine the slope across the plane.
+/// Ridge regularisation as a fraction of each observation's variance. Without it, the slope would be undetermined in every
+/// direction in which the terminal states do not vary.
 const RIDGE: f64 = 1e-4;
 
-/// The fitted plane v(o) ≈ level + slope · (o − centre) of observations o as in eq. (28) of \[GSFM26\].
+/// The fitted linear function v(o) ≈ level + slope · (o − centre) of observations o as in eq. (28) of \[GSFM26\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Surrogate {
     centre: [f64; N],
@@ -22,8 +22,8 @@ pub(super) struct Surrogate {
 }
 
 impl Surrogate {
-    /// The least-squares plane through the terminal values of the candidates of `worth`. `None` if fewer than two candidates
-    /// for each slope are finite, or if the fit is not finite.
+    /// The least-squares fit to the terminal values of the candidates in `worth`. `None` if there are fewer than two candidates
+    /// with finite values per slope, or if the fit is not finite.
     pub fn fit(worth: &[Worth]) -> Option<Surrogate> {
         let ends = || worth.iter().flat_map(ends_of).filter(|(o, v)| (o.sum() + v).is_finite());
         let count = ends().count();
@@ -49,7 +49,7 @@ impl Surrogate {
         surrogate.slope.iter().all(|x| x.is_finite()).then_some(surrogate)
     }
 
-    /// Evaluates the plane at the observations of several candidates, one per lane.
+    /// Evaluates the function at the observations of several candidates, one per lane.
     #[inline(always)]
     pub fn value<R: Real>(&self, seen: &[R; N]) -> R {
         let mut value = R::from_f64(self.level);
@@ -74,7 +74,7 @@ fn ends_of(worth: &Worth) -> impl Iterator<Item = (SVector<f64, N>, f64)> {
 mod tests {
     use super::*;
 
-    /// Terminal states with eleven varying observations and values on a plane.
+    /// Terminal states of which eleven observations vary. Their values are a linear function of these observations.
     fn valued(block: usize) -> Worth {
         let mut worth = Worth::NONE;
         for lane in 0..worth.value.len() {
@@ -111,7 +111,7 @@ mod tests {
         assert_eq!(Surrogate::fit(&lost), None);
     }
 
-    /// Terminal states without variance give a plane of slope zero.
+    /// Terminal states without variance give a function of slope zero.
     #[test]
     fn equal_ends_have_their_value() {
         let mut worth = [Worth::NONE; 2];

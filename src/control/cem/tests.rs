@@ -27,7 +27,7 @@ fn a_search_does_not_start_from_candidates_of_a_failed_one() {
     let target = Target { roll: 0.5, pitch: 0.1, airspeed: 16.67 };
     let mut fresh = Cem::new("cem", &model, settings, Aids::default());
     let mut failed = fresh.clone();
-    // as many as the critics value again, more than the lanes of a block
+    // the critics evaluate this number of candidates again, which exceeds the lanes of a block
     failed.kept = vec![[[0.9; 3]; HORIZON]; RESCORED];
     assert_eq!(failed.command(&seen, &target), fresh.command(&seen, &target));
 }

@@ -1,4 +1,4 @@
-//! A controller whose commands pass through the envelope limiter, in the form in which the pilot flies it.
+//! A controller in series with the envelope limiter, combined in the same way as in the pilot.
 
 use crate::envelope::EnvelopeLimiter;
 use crate::insight::Insight;

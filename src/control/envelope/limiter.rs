@@ -1,8 +1,9 @@
 //! The envelope limiter between a controller and the surfaces. The elevator limits load factor and angle of attack, the
 //! aileron limits bank, the rudder limits sideslip.
 //!
-//! Each limit gives a control law for the surface. The command is clamped between the laws of both sides (min/max
-//! selection, as in fly-by-wire: Stevens, Lewis and Johnson, *Aircraft Control and Simulation*, 3rd ed., section 4.6).
+//! Each limit gives a control law for the surface. The command is clamped between the deflections that the laws of the two
+//! sides give (min/max selection, as in fly-by-wire: Stevens, Lewis and Johnson, *Aircraft Control and Simulation*, 3rd ed.,
+//! section 4.6).
 //! The law is that of an exponential control barrier function (Nguyen and Sreenath, ACC 2016). If x is limited to x_lim
 //! and the surface controls ẍ,
 //!
@@ -10,9 +11,9 @@
 //! ẍ + 2 ω (ẋ − ẋ_lim) + ω² (x − x_lim) = 0
 //! ```
 //!
-//! brings x to its limit without overshoot. Commands inside the limits are unchanged. The model gives accelerations and
-//! surface effects at the state predicted for the time at which a command acts. They therefore include the effects of
-//! rolling, airspeed and gravity.
+//! brings x to its limit without overshoot. Commands inside the limits are unchanged. The model gives the accelerations and
+//! the effects of the surfaces at the state that is predicted for the time at which a command acts. They therefore include the
+//! effects of rolling, airspeed and gravity.
 
 use crate::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
 use crate::envelope::{Bounds, load_factor_under};
@@ -31,7 +32,7 @@ const PITCH_POLE: f64 = 10.0;
 const BANK_POLE: f64 = 10.0;
 /// Pole ω of the law for sideslip, rad/s.
 const SIDESLIP_POLE: f64 = 10.0;
-/// Number of steps until a command acts: one to the next tick, the others for the lag of a surface's actuator.
+/// Number of steps until a command acts. The first is the step to the next tick, the others stand for the lag of the actuator.
 const AHEAD: usize = 3;
 /// Deflection for the finite difference of a surface's effect, as a fraction of its travel.
 const PROBE: f64 = 0.1;
@@ -113,7 +114,7 @@ struct Moment<'a> {
     dynamics: Dynamics<'a>,
     state: State,
     controls: Controls,
-    /// Rates of the state, and rates after [`SPAN_S`] of the predicted motion, per second.
+    /// Rates of the state now and after [`SPAN_S`] of the predicted motion, per second.
     rates: [State; 2],
 }
 
@@ -213,7 +214,7 @@ impl EnvelopeLimiter {
         }
     }
 
-    /// Limits load factor and angle of attack. Both are limits of the angle of attack.
+    /// Limits load factor and angle of attack. The limit of the load factor is converted to one of the angle of attack.
     fn keep_load(&self, at: &Moment, out: &mut Limited) {
         let travel = self.model.airframe.actuators.elevator.travel;
         let motion = at.motion(Surface::Elevator, travel, |s| s.alpha);
@@ -222,8 +223,8 @@ impl EnvelopeLimiter {
             return;
         }
         let bounds = self.bounds.within(PART);
-        // the load factor is computed for the elevator that holds the angle of attack, because a moving elevator adds its own
-        // lift
+        // the load factor is computed for the elevator deflection that keeps the angle of attack constant, because a moving
+        // elevator adds its own lift
         let held = (motion.deflection - motion.acceleration / motion.effect)
             .clamp(travel.least, travel.most);
         let law = |side: usize| motion.law(at.incidence_limit(&bounds, side, held), PITCH_POLE);
@@ -232,7 +233,8 @@ impl EnvelopeLimiter {
         let [push, pull] = at.lift_limits(&self.bounds, motion.deflection);
         let low = if pull > most.0 { (pull.min(least.0), Limit::Load) } else { most };
         let high = if push < least.0 { (push.max(most.0), Limit::Load) } else { least };
-        // the lower bound limits nose-up commands and has priority: stall and largest load factor before smallest load factor
+        // The lower bound limits nose-up commands. It has priority: the stall and the largest load factor are avoided
+        // before the smallest load factor.
         clamp(&mut out.command.elevator, &mut out.by, travel, [low, high]);
     }
 }
@@ -270,7 +272,7 @@ impl Dynamics<'_> {
         self.model.rate(state, controls, self.altitude).advance(&self.unexplained, 1.0)
     }
 
-    /// Rates of `state` under `controls`, and those after [`SPAN_S`] of this motion, per second.
+    /// Rates of `state` under `controls` now and after [`SPAN_S`] of the motion with these rates, per second.
     fn rates(&self, state: &State, controls: &Controls) -> [State; 2] {
         let rate = self.rate(state, controls);
         [rate, self.rate(&state.advance(&rate, SPAN_S), controls)]
@@ -314,7 +316,8 @@ impl Moment<'_> {
         [most, least]
     }
 
-    /// The limit of the angle of attack on one side (0 minimum, 1 maximum): the load factor's, or the stall's if it is nearer.
+    /// The limit of the angle of attack on one side (0 minimum, 1 maximum): that of the load factor, or that of the stall if the
+    /// latter is nearer. `elevator` is the deflection (rad) at which the load factor is computed.
     fn incidence_limit(&self, bounds: &Bounds, side: usize, elevator: f64) -> At {
         let stall = At { limit: Limit::Incidence, value: bounds.alpha[side], rate: 0.0 };
         let mut alpha = self.state.alpha;

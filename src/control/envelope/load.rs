@@ -1,4 +1,4 @@
-//! The load factor of the model: over one step, from state rates, and its derivatives.
+//! The load factor of the model, from one step or from state rates, with its derivatives.
 
 use greylag_model::STEP;
 use greylag_physics::State;
@@ -30,7 +30,7 @@ pub fn load_factor_under(s: &State, rate: &State) -> f64 {
     (gravity + v * cos_a * cos_b * s.q - v * sin_b * s.p - down) / G0
 }
 
-/// Derivatives of [`load_factor`], in g per unit of each state: by `s` at a fixed `next`, then by `next` at a fixed `s`.
+/// Derivatives of [`load_factor`], in g per unit of each state: first with respect to `s`, then with respect to `next`.
 pub fn load_factor_slopes(s: &State, next: &State) -> [[f64; 8]; 2] {
     let ((sin_a, cos_a), (sin_b, cos_b)) = (s.alpha.sin_cos(), s.beta.sin_cos());
     let ((sin_roll, cos_roll), (sin_pitch, cos_pitch)) = (s.roll.sin_cos(), s.pitch.sin_cos());

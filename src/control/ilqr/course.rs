@@ -1,9 +1,9 @@
 //! The attitude reference that a plan follows: a path to the target that the aircraft can fly.
 //!
 //! Each axis is driven by a cascade with limited rate and acceleration, like the attitude and rate loops of a flight
-//! controller. The load factor n limits pitch. In coordinated flight θ̇ = (g / V) (n cos φ − cos θ), from the rigid body's
-//! force equations with V and α constant. The path continues from tick to tick. The path waits while the aircraft lags behind
-//! it.
+//! controller. The load factor n limits the pitch rate. In coordinated flight θ̇ = (g / V) (n cos φ − cos θ), from the rigid
+//! body's force equations with V and α constant. A tick continues the path of the previous tick. The path waits while the
+//! aircraft lags behind it.
 
 use super::STEPS;
 use crate::envelope::G0;
@@ -11,22 +11,23 @@ use greylag_model::{GreyBox, STEP};
 use greylag_physics::State;
 use std::f64::consts::TAU;
 
-/// Limit of the bank (rad) in the formula for the path's body rates, which is singular at 90°.
+/// Largest bank (rad) that is inserted into the formula for the path's body rates, which is singular at 90°.
 const STEEP: f64 = 1.4;
 /// Largest roll and pitch rates, rad/s: 70 and 60 °/s, the defaults of PX4's FW_R_RMAX and FW_P_RMAX_POS.
 const MOST: [f64; 2] = [1.22, 1.05];
 /// Largest lead of the path over the aircraft in each axis, rad.
 const AHEAD: f64 = 0.02;
-/// Intermediate banks that are tried, as fractions of the target bank, and the durations for which they are held, in
-/// ticks.
+/// Intermediate banks that are compared, as fractions of the target bank. Each is combined with every duration in `TICKS`
+/// (ticks).
 const PARTS: [f64; 3] = [0.0, 0.35, 0.7];
 const TICKS: [usize; 6] = [30, 60, 100, 150, 210, 300];
-/// Duration of a trial and its integration step, ticks.
+/// Duration of the simulation by which intermediate banks are compared, ticks. `COARSE` is its integration step, ticks.
 const TRIAL: usize = 600;
 const COARSE: usize = 5;
 /// Another intermediate bank replaces the present one if its cost is below this fraction of the present one's cost.
 const BETTER: f64 = 0.97;
-/// Smallest target bank, and smallest pitch-up from the present pitch, for which an intermediate bank is considered, rad.
+/// Smallest target bank for which an intermediate bank is considered, rad. `UP_ENOUGH` is the smallest pitch-up from the
+/// present pitch, rad.
 const STEEP_ENOUGH: f64 = 0.5;
 const UP_ENOUGH: f64 = 0.1;
 /// Fraction of the largest acceleration that is used for braking.
@@ -41,9 +42,9 @@ pub(super) struct Approach {
     rates: [f64; 2],
     /// Largest roll and pitch accelerations, rad/s².
     accelerations: [f64; 2],
-    /// Fraction of the largest roll rate that remains when a steep bank uses all of the load factor.
+    /// Fraction of the largest roll rate that is still used when a steep bank needs all of the load factor.
     steep: f64,
-    /// Scale of the roll error from the path in the cost, rad.
+    /// Scale of the roll deviation from the path in the cost function, rad.
     pub roll: f64,
 }
 
@@ -69,7 +70,8 @@ impl Approach {
         }
     }
 
-    /// Angle (rad) and rate (rad/s) of an axis after `span` seconds, on the way to an angle that is `error` (rad) away.
+    /// Angle (rad) and rate (rad/s) of an axis after `span` seconds, on the way to an angle that is `error` (rad) away. `at` is
+    /// the angle and rate at the start. `least` and `most` limit the commanded rate.
     fn step(
         &self,
         axis: usize,
@@ -119,7 +121,7 @@ impl Point {
     }
 }
 
-/// An intermediate bank. The target bank is delayed if it would use the load factor that the pitch-up needs.
+/// An intermediate bank, flown before a target bank that would use up the load factor needed for a pitch-up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct First {
     /// The intermediate bank as a fraction of the target bank.
@@ -182,7 +184,8 @@ impl Task<'_> {
         sum
     }
 
-    /// The intermediate bank with the smallest cost. It replaces the present one only if its cost is clearly smaller.
+    /// The intermediate bank with the smallest cost. It replaces the present one, `flown`, only if its cost is smaller by the
+    /// factor `BETTER`.
     fn choose(&self, from: &Point, flown: First) -> First {
         let [bank, pitch] = self.target;
         if bank.abs() < STEEP_ENOUGH || pitch - from.attitude[1] < UP_ENOUGH {
@@ -201,7 +204,7 @@ impl Task<'_> {
     }
 }
 
-/// The path of a tick, which the next tick continues.
+/// The path of the present tick, and the point from which the next tick continues it.
 #[derive(Clone, Debug)]
 pub(super) struct Course {
     points: Vec<Point>,
@@ -290,7 +293,7 @@ mod tests {
         roll: 0.1,
     };
 
-    /// The points of a path that the aircraft follows exactly for `ticks` ticks.
+    /// The points of a path from level flight that the aircraft follows exactly for `ticks` ticks.
     fn follow(target: [f64; 2], load: [f64; 2], ticks: usize) -> Vec<Point> {
         let mut course = Course::new();
         let mut state = State { airspeed: 20.0, ..State::NEUTRAL };

@@ -1,7 +1,7 @@
 //! Comparison of the attitude that a plan predicted with the attitude that is reached.
 //!
-//! One-step predictions do not show an error of the closed loop: a model whose accelerations are nearly right may still make
-//! plans under which the aircraft oscillates. The attitude a quarter of a second later shows it.
+//! One-step predictions do not show an error of the closed loop: a model whose accelerations are nearly right may still give
+//! plans under which the aircraft oscillates. A comparison after a quarter of a second shows the oscillation.
 
 use crate::Target;
 use greylag_physics::State;
@@ -36,8 +36,8 @@ impl Forecast {
         self.expected = [None; SPAN];
     }
 
-    /// Advances to the next tick. Returns the larger of the prediction's errors in roll and pitch, rad, each reduced by the
-    /// change of the target since the prediction. `None` if there is no prediction for this tick.
+    /// Advances to the next tick. Returns the larger of the prediction's errors in roll and pitch, rad. Each error is reduced by
+    /// the change of the target since the prediction. `None` if there is no prediction for this tick.
     pub fn error(&mut self, seen: &State, target: &Target) -> Option<f64> {
         self.now = (self.now + 1) % SPAN;
         let then = self.expected[self.now].take()?;
@@ -89,7 +89,7 @@ mod tests {
             forecast.error(&at(0.0), &TARGET);
             forecast.note(&at(0.0), &TARGET);
         }
-        // a client that moves its setpoint at every tick does not switch the comparison off
+        // a client that moves its setpoint at every tick does not disable the comparison
         let moved = Target { roll: 1.1, ..TARGET };
         let error = forecast.error(&at(0.4), &moved).unwrap();
         assert!((error - 0.3).abs() < 1e-12, "{error}");

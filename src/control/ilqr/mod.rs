@@ -1,9 +1,9 @@
 //! iLQR: a plan over half a second from exact derivatives of the model.
 //!
-//! Differential dynamic programming without second derivatives of the model (Todorov and Li, ACC 2005;
-//! Tassa, Mansard and Todorov, ICRA 2014, for limited commands), one iteration per tick from the last plan,
-//! which is the real-time iteration of Diehl et al. (2002). Throttle and attitude limits come from the
-//! LQI. The prediction includes the disturbance estimate. The steady-state error is therefore zero.
+//! The method is differential dynamic programming without second derivatives of the model (Todorov and Li, ACC 2005;
+//! Tassa, Mansard and Todorov, ICRA 2014, for limited commands). Each tick runs one iteration from the last plan, as in
+//! the real-time iteration of Diehl et al. (2002). Throttle and attitude limits come from the LQI. The prediction
+//! includes the disturbance estimate. The steady-state error is therefore zero.
 
 mod cost;
 mod course;
@@ -34,12 +34,13 @@ use solve::Solver;
 /// Horizon in steps of 10 ms.
 const STEPS: usize = 50;
 
-/// Ticks for which the LQI flies after a wrong prediction. They exceed the averaging time of the prediction check, so
-/// that an intermittently wrong model is not used in between.
+/// Ticks for which the LQI flies after a wrong prediction. This time exceeds the averaging time of the prediction check. A
+/// model that is wrong intermittently is therefore not used in between.
 const WAIT: usize = 500;
 
-/// Ticks between trials of the LQI's flight as a starting point. Without these trials, steps with 40 ms of delay
-/// overshoot more often (18 instead of 10 %). At every tick, the trial takes one sixth of the controller's computing time.
+/// Ticks between simulations of the LQI's flight as a possible starting point. Without these simulations, more of the steps
+/// with 40 ms of delay overshoot (18 instead of 10 %). A simulation at every tick would take one sixth of the controller's
+/// computing time.
 const EVERY: usize = 5;
 
 /// Aileron and elevator commands as fractions of the largest deflection.
@@ -66,13 +67,13 @@ pub struct Ilqr {
 }
 
 impl Ilqr {
-    /// A planner with `model`, which starts from and falls back on `lqi`.
+    /// A planner with `model`. `lqi` is a starting point of the plans and flies if there is no plan.
     pub fn new(model: &GreyBox, lqi: Lqi) -> Ilqr {
         Ilqr::with("ilqr", model, lqi, None, Settings::PLAIN)
     }
 
-    /// A planner with `settings`, registered under `name`. The policy of `agent` is a further starting point, but only
-    /// with `Start::Policy`.
+    /// A planner with `settings`, registered under `name`. With `Start::Policy`, the policy of `agent` is a further starting
+    /// point.
     pub fn with(
         name: &'static str,
         model: &GreyBox,
@@ -105,8 +106,8 @@ impl Ilqr {
         }
     }
 
-    /// The first `N` steps (at most 50) of this tick's plan, aileron and elevator. `None` if no plan is finite, and
-    /// while the LQI flies after a wrong prediction.
+    /// Aileron and elevator commands of the first `N` steps (at most 50) of this tick's plan. `None` if no plan is finite,
+    /// and while the LQI flies after a wrong prediction.
     pub(crate) fn plan<const N: usize>(
         &mut self,
         seen: &Observation,
@@ -117,8 +118,8 @@ impl Ilqr {
     }
 }
 
-/// How `model` approaches a target along a path. `None` if the plan follows the target itself, or if the model has no
-/// roll rate at cruise.
+/// Limits and gains of the path on which `model` approaches a target. `None` if the plan follows the target itself, or if
+/// the model has no positive roll rate at cruise.
 fn approach(model: &GreyBox, towards: Towards) -> Option<Approach> {
     match towards {
         Towards::Target => None,
@@ -134,14 +135,14 @@ struct Desk {
     plan: Option<[Surfaces; STEPS]>,
     /// The last tick's target.
     target: Option<Target>,
-    /// Ticks until the LQI's flight is tried again.
+    /// Ticks until the LQI's flight is simulated again as a starting point.
     until_lqi: usize,
     flown: Trajectory,
 }
 
 /// Starting points of a tick other than the last plan.
 struct Starts<'a> {
-    /// The LQI before this tick's command.
+    /// The LQI in its state before this tick's command.
     lqi: &'a Lqi,
     /// Memory for the LQI's gains over the plan.
     ahead: &'a mut Ahead,
@@ -151,9 +152,9 @@ struct Starts<'a> {
 }
 
 impl Desk {
-    /// The cheapest starting plan with its cost: the last plan shifted by a step, or the LQI's flight in the model
-    /// (tried every [`EVERY`] ticks and for a new target), or the policy's (tried for a new target). `None` if no
-    /// cost is finite.
+    /// The starting plan of lowest cost, with its cost. The candidates are the last plan shifted by a step, the LQI's
+    /// commands in the model (every [`EVERY`] ticks and for a new target) and the policy's commands in the model (for a
+    /// new target). `None` if no cost is finite.
     fn begin(&mut self, problem: &Problem, starts: Starts) -> Option<([Surfaces; STEPS], f64)> {
         let mut best = None;
         if let Some(last) = &self.plan {
@@ -187,7 +188,7 @@ impl Desk {
         best
     }
 
-    /// Runs this tick's iterations; `None` if no plan is finite.
+    /// Runs this tick's iterations and returns the plan. `None` if no plan is finite.
     fn improve(&mut self, problem: &Problem, starts: Starts) -> Option<[Surfaces; STEPS]> {
         let (mut start, mut cost) = self.begin(problem, starts)?;
         for _ in 0..problem.settings.iterations {
@@ -216,7 +217,7 @@ impl Controller for Ilqr {
     }
 
     fn overruled(&mut self, by: &Overruled) {
-        // a plan holds no integrators; the LQI has them and is informed only while it flies
+        // a plan has no integrators. The LQI has integrators and is informed only while it flies
         if self.desk.plan.is_none() {
             self.lqi.overruled(by);
         }

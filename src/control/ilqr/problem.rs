@@ -17,8 +17,8 @@ use greylag_physics::actuators::Actuators;
 use greylag_physics::inputs::InputMemory;
 use greylag_physics::{Command, Controls, State};
 
-/// Number of states: the eight of eq. (4), then four for aileron and four for elevator. These four are the deflection now and
-/// one step ago, and the last two commanded deflections, rad.
+/// Number of states: the eight of eq. (4), then four for aileron and four for elevator. The four states of a surface are its
+/// deflection now and one step ago, and its last two commanded deflections, rad.
 pub(super) const STATES: usize = 16;
 
 /// Indices of the deflections of aileron and elevator in the state. The other three states of each filter follow.
@@ -29,7 +29,8 @@ pub(super) type Square = SMatrix<f64, STATES, STATES>;
 /// A vector over the states.
 pub(super) type Vector = SVector<f64, STATES>;
 
-/// Angle of attack above which it adds to the cost if the envelope sets no limit, and the scale of the excess, rad.
+/// Limit of the angle of attack beyond which the excess adds to the cost, and the scale of this excess, rad. Both are used only
+/// if the settings have no envelope limits.
 const STALL: [f64; 2] = [0.16, 0.02];
 
 /// The optimal control problem of one tick.
@@ -75,7 +76,7 @@ impl Trajectory {
         self.states.iter()
     }
 
-    /// The state difference of two trajectories at a step.
+    /// The state vector at a step minus that of `other`.
     pub fn less(&self, other: &Trajectory, step: usize) -> Vector {
         self.at(step) - other.at(step)
     }
@@ -144,12 +145,13 @@ impl Problem<'_> {
         ];
     }
 
-    /// Simulates a plan and returns its cost.
+    /// Simulates a plan, writes its trajectory to `out` and returns its cost.
     pub fn fly(&self, plan: &[Surfaces; STEPS], out: &mut Trajectory) -> f64 {
         self.fly_with(out, |step, _| plan[step]).1
     }
 
-    /// Simulates the commands of `choose`, whose argument is the trajectory so far. Returns the plan and its cost.
+    /// Simulates the commands that `choose` returns for a step and the trajectory up to this step. Writes the trajectory to `out`
+    /// and returns the plan with its cost.
     pub fn fly_with(
         &self,
         out: &mut Trajectory,
@@ -158,7 +160,7 @@ impl Problem<'_> {
         self.fly_choosing(out, |step, _, trajectory| choose(step, trajectory))
     }
 
-    /// Simulates the LQI's commands. Returns their plan and its cost.
+    /// Simulates the LQI's commands. Writes the trajectory to `out` and returns the commands as a plan with its cost.
     pub fn follow(&self, ahead: &Ahead, out: &mut Trajectory) -> ([Surfaces; STEPS], f64) {
         let figures = &self.model.airframe.actuators;
         let mut reference = ahead.reference();
@@ -169,7 +171,7 @@ impl Problem<'_> {
         })
     }
 
-    /// Simulates the policy's commands. Returns their plan and its cost.
+    /// Simulates the policy's commands. Writes the trajectory to `out` and returns the commands as a plan with its cost.
     pub fn follow_policy(
         &self,
         actor: &Actor,
@@ -211,7 +213,7 @@ impl Problem<'_> {
         (plan, cost)
     }
 
-    /// Cost of each state component, with the component's index in the state.
+    /// Cost terms of the state `s` after `step` steps, each with the index of its component in the state.
     fn costs(&self, s: &State, step: usize) -> [(usize, Cost); 7] {
         let [mut p, mut q, mut r, _, beta] = self.goal.steady;
         let point = self.course.at(step);
@@ -286,8 +288,8 @@ impl Problem<'_> {
         (slope, curvature)
     }
 
-    /// Index in the state `x` of the last commanded deflection of each surface, and the deflection (rad) of full command on
-    /// the side of this deflection.
+    /// For each surface: the index in the state `x` of the last commanded deflection, and the deflection (rad) of full command on
+    /// the same side.
     pub fn last_commands(&self, x: &Vector) -> [(usize, f64); 2] {
         let figures = &self.model.airframe.actuators;
         let travels = [figures.aileron.travel, figures.elevator.travel];
@@ -299,7 +301,7 @@ impl Problem<'_> {
         1.0 / (self.settings.moves * self.settings.moves)
     }
 
-    /// One step of the aircraft and its actuators, linear about the trajectory.
+    /// The transition of the aircraft and its actuators in one step, linearised about the trajectory.
     pub fn linear(&self, trajectory: &Trajectory, step: usize) -> Transition {
         let figures = &self.model.airframe.actuators;
         let (state, controls) = (&trajectory.states[step], &trajectory.controls[step]);

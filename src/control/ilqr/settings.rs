@@ -7,9 +7,9 @@ pub struct Settings {
     pub attitude: f64,
     /// Attitude error beyond which the cost grows linearly (pseudo-Huber), rad. `None` keeps the cost quadratic.
     pub far: Option<f64>,
-    /// Scale of the difference of the body rates from the reference, rad/s.
+    /// Scale of the difference between the body rates and their reference, rad/s.
     pub rate: f64,
-    /// Scale of the difference of sideslip from the steady turn, rad.
+    /// Scale of the difference between the sideslip and that of the steady turn, rad.
     pub sideslip: f64,
     /// Scale of the change of a command from one step to the next, as a fraction of full command.
     pub moves: f64,
@@ -19,8 +19,8 @@ pub struct Settings {
     pub envelope: Option<Barrier>,
     /// Reference that the plan follows.
     pub towards: Towards,
-    /// Largest error of the attitude predicted a quarter of a second before, rad. Beyond it the LQI flies for 5 s. `None`
-    /// does not compare.
+    /// Largest error of the attitude predicted a quarter of a second before, rad. After a larger error the LQI flies for 5 s.
+    /// `None` disables the comparison.
     pub missed: Option<f64>,
     /// Number of iterations per tick.
     pub iterations: usize,
@@ -60,8 +60,8 @@ pub enum Towards {
 }
 
 impl Settings {
-    /// Settings of the controller `ilqr`. Several variants were flown on every seventh target. These settings settle as fast as
-    /// any of them and are the steadiest in moderate turbulence.
+    /// Settings of the controller `ilqr`. Several variants were flown on every seventh target. With these settings the attitude
+    /// settles as fast as with any other variant and is the steadiest in moderate turbulence.
     pub const PLAIN: Settings = Settings {
         attitude: 0.05,
         far: None,
@@ -81,7 +81,8 @@ impl Settings {
         far: Some(0.15),
         envelope: Some(Barrier { part: 0.94, load: 0.05, alpha: 0.01, sideslip: 0.05 }),
         towards: Towards::Path,
-        // 0.12 to 0.3 rad lose no step on models drawn with widths of 15 % (results/flight-quality.txt)
+        // with 0.12 to 0.3 rad no aircraft is lost in steps with models drawn from the coefficients' standard deviations
+        // (results/flight-quality.txt)
         missed: Some(0.15),
         start: Start::Policy,
         ..Settings::PLAIN

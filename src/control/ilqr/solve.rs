@@ -38,8 +38,9 @@ impl Solver {
         std::mem::swap(&mut self.spare, trajectory);
     }
 
-    /// One iteration from `plan`, whose cost along `trajectory` is `cost`. Returns the first plan of the line search with a
-    /// lower cost, and this cost. Without such a plan it returns `plan`. `trajectory` becomes the result's trajectory.
+    /// One iteration from `plan`, which has the trajectory `trajectory` and the cost `cost`. Returns the first plan of the line
+    /// search with a lower cost, and this cost. If there is none, it returns `plan` and `cost`. `trajectory` becomes that of the
+    /// returned plan.
     pub fn iterate(
         &mut self,
         problem: &Problem,
@@ -129,8 +130,9 @@ fn reduced(q_xx: Square, q_uu: &Matrix2<f64>, q_ux: &Gain, gain: &Gain) -> Squar
     value
 }
 
-/// Minimiser of the quadratic cost with the commands limited to −1..1, and its feedback gain, which is zero for a command at
-/// its limit (Tassa et al. 2014). With two commands all active sets are tried. `None` if a value is not finite.
+/// Minimiser of the quadratic cost with the commands limited to −1..1, and its feedback gain (Tassa et al. 2014). The gain is
+/// zero for a command at its limit. As there are only two commands, all active sets are computed. `now` has the present
+/// commands. `None` if a value is not finite.
 fn limited(
     slope: &Vector2<f64>,
     curvature: &Matrix2<f64>,
@@ -181,7 +183,7 @@ mod tests {
         assert!((reduced(q_xx, &q_uu, &q_ux, &gain) - sum).amax() < 1e-12);
     }
 
-    /// The reference is the change of lowest cost within the limits on a grid.
+    /// The result is compared with the change of lowest cost on a grid within the limits.
     #[test]
     fn limits_are_kept_at_the_least_cost() {
         let curvature = Matrix2::new(2.0, 0.6, 0.6, 1.0);

@@ -1,7 +1,7 @@
-//! The linear transition of a step, with products that omit its zeros.
+//! The linear transition of a step, with matrix products that skip its zeros.
 //!
-//! Half of the states belong to the actuators' filters, whose rows have at most four entries. The products of the backward
-//! pass therefore take a third of the operations of dense products.
+//! Half of the states belong to the actuators' filters. Their rows of the transition matrix have at most four entries. The
+//! products of the backward pass therefore take a third of the operations of dense products.
 
 use super::problem::{STATES, SURFACES, Square, Vector};
 use greylag_physics::servos::Surface;
@@ -10,11 +10,12 @@ use nalgebra::{SMatrix, SVector};
 /// A matrix whose columns have one entry per state.
 pub(super) type Columns<const N: usize> = SMatrix<f64, STATES, N>;
 
-/// The transition δx₊ = A δx + B δu. The aircraft's eight states follow their Jacobian. The other eight states are those of the
+/// The transition δx₊ = A δx + B δu. The first eight states are the aircraft's. The other eight are those of the actuator
 /// filters of aileron and elevator.
 #[derive(Clone, Debug)]
 pub(super) struct Transition {
-    /// Jacobian of the aircraft's states with respect to themselves, then to the deflections of aileron and elevator.
+    /// Jacobian of the aircraft's states after the step with respect to the states before it (eight columns) and to the
+    /// deflections of aileron and elevator (two columns).
     pub aircraft: SMatrix<f64, 8, 10>,
     pub filters: [Filter; 2],
 }
@@ -94,7 +95,7 @@ impl Transition {
         out
     }
 
-    /// Adds `by` times the row of A for the aircraft's state `row` to `to`.
+    /// Adds the row of A for the aircraft's state `row`, multiplied by `by`, to `to`.
     pub fn add_row(&self, row: usize, by: f64, to: &mut Vector) {
         let of: SVector<f64, 10> = self.aircraft.row(row).transpose();
         for i in 0..8 {

@@ -29,14 +29,14 @@ pub(super) struct Law {
 struct RudderLaw {
     /// Gains of aileron and elevator on the rudder's filter states.
     coupling: [[f64; RUDDER_STATES]; 2],
-    /// Gain row of the rudder on the states other than its filter states.
+    /// Gains of the rudder on the states other than its filter states. `own` has the gains on its filter states.
     row: [f64; STATES],
     own: [f64; RUDDER_STATES],
     /// Deflection of the rudder in the steady state, rad.
     deflection: f64,
 }
 
-/// Properties that convert deflections to commands, and the angle of attack above which the law pushes the nose down.
+/// Surface travels that convert deflections to commands, and the angle of attack above which the law lowers the nose.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Surfaces {
     pub figures: ActuatorFigures,
@@ -139,8 +139,8 @@ impl Law {
 }
 
 impl RudderLaw {
-    /// The rudder's deflection (rad), where `held` is the steady one. Adds the contribution of the rudder's filter states to
-    /// the deflections `u` of aileron and elevator.
+    /// Returns the rudder's deflection (rad), where `held` is its deflection in the steady state. Adds the contribution of the
+    /// rudder's filter states `y` to the deflections `u` of aileron and elevator.
     #[inline(always)]
     fn act<R: Real>(&self, held: R, x: &[R; STATES], y: &[R; RUDDER_STATES], u: &mut [R; 2]) -> R {
         let mut yaw = held;
@@ -182,8 +182,8 @@ impl From<Entry> for Law {
 /// Number of steps for which one gain is held.
 pub(super) const HOLD: usize = 5;
 
-/// The part of the LQI's prediction that does not depend on the simulated aircraft. The gains are scheduled along the
-/// reference at the tick's airspeed. The integrators are constant.
+/// The part of the LQI's prediction that is common to all simulated aircraft. The gains are scheduled along the reference at the
+/// airspeed of the tick. The integrators keep their values of the tick.
 #[derive(Clone, Debug)]
 pub(crate) struct Ahead {
     pub(super) laws: Vec<Law>,
@@ -220,7 +220,7 @@ impl Ahead {
         self.inner.reference
     }
 
-    /// The command at `step` for a simulated aircraft. Advances its `reference` (rad).
+    /// The command at `step` for a simulated aircraft. Advances the aircraft's `reference` (rad).
     #[inline(always)]
     pub(crate) fn command<R: Real>(
         &self,

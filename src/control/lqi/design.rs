@@ -6,8 +6,8 @@ use super::riccati;
 use greylag_model::{GreyBox, Linear, STEP, Trim, linearise};
 use greylag_physics::servos::Surface;
 
-/// Number of states of the design: φ θ p q r α β, then four for aileron and four for elevator, then ∫φ and ∫θ. The four are
-/// the deflection now and one step ago, and the last two commanded deflections.
+/// Number of states of the design: φ θ p q r α β, then four for aileron and four for elevator, then ∫φ and ∫θ. The four
+/// states of a surface are its deflection now and one step ago, and its last two commanded deflections.
 pub(super) const STATES: usize = 17;
 
 /// Number of additional states of a design with a rudder: its deflection now and one step ago, and its last two commanded
@@ -29,7 +29,7 @@ pub(super) struct Gain {
 pub(super) struct RudderGain {
     /// Gains of aileron and elevator on the rudder's filter states.
     pub coupling: SMatrix<f64, 2, RUDDER_STATES>,
-    /// Gains of the rudder on the other states, then on its filter states.
+    /// Gains of the rudder on the states other than its filter states. `own` has the gains on its filter states.
     pub row: RowSVector<f64, STATES>,
     pub own: RowSVector<f64, RUDDER_STATES>,
 }
@@ -62,7 +62,8 @@ const ATTITUDE_STATES: [usize; 7] = [0, 1, 3, 4, 5, 6, 7];
 /// Cost scales by Bryson's rule. The weight of each term is one over the square of its scale. A larger scale therefore gives
 /// a softer loop.
 ///
-/// The scales were tuned on the `jsbsim` model by the settled error over the target file, which is not sensitive to them.
+/// The scales were tuned on the `jsbsim` model for a small settled error over the target file. The settled error is not
+/// sensitive to them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weights {
     /// Attitude error scale, rad.
@@ -89,9 +90,9 @@ impl Weights {
         sideslip_by_rudder: 0.03,
         deflection: 0.3,
     };
-    /// Weights of softer loops with a larger delay margin. In pitch the margin is 104 ms where the default has 46 ms, and 78 ms
-    /// where the default has 32 ms (`examples/delay_margin.rs`, behind ArduPlane's filter and sampling). Still softer weights
-    /// (0.15, 0.1, 0.15) have 200 ms.
+    /// Weights of softer loops with a larger delay margin. In pitch the margin is 104 ms instead of the default's 46 ms. With
+    /// ArduPlane's filter and sampling it is 78 ms instead of 32 ms (`examples/delay_margin.rs`). Still softer weights (0.15,
+    /// 0.1, 0.15) have 200 ms.
     pub const DAMPED: Weights =
         Weights { attitude: 0.08, integral: 0.05, deflection: 0.2, ..Weights::DEFAULT };
 }

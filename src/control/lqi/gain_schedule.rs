@@ -20,11 +20,11 @@ struct Axis {
 const AIRSPEEDS: usize = 20;
 /// Grid spacing of roll and pitch, degrees.
 const SPACING_DEG: f64 = 10.0;
-/// Largest angle of the grid, in spacings (80°): there is no steady turn at 90°.
+/// Largest angle of the grid, in units of the grid spacing (80°). It is below 90°, where no steady turn exists.
 const STEEPEST: f64 = 8.0;
 
-/// Grid over airspeed (m/s), roll and pitch (rad). It extends beyond the envelope: the angles to whole spacings, the airspeeds
-/// by a margin.
+/// Grid over airspeed (m/s), roll and pitch (rad). It extends beyond the envelope. The angles are rounded outwards to multiples
+/// of the spacing, and the airspeeds have a margin.
 #[derive(Clone, Copy, Debug)]
 struct Grid {
     airspeed: Axis,
@@ -81,7 +81,7 @@ pub(super) struct Schedule {
 }
 
 impl Axis {
-    /// The grid of an angle, from `low` to `high` in spacings.
+    /// The grid of an angle from `low` to `high`, both in units of the grid spacing.
     fn attitude(low: f64, high: f64) -> Axis {
         // in units of 30°, in which multiples of 30° are exact
         let first = low / 3.0 * std::f64::consts::FRAC_PI_6;
@@ -103,7 +103,8 @@ impl Axis {
 impl Schedule {
     /// Designs the whole grid from `model`, on all cores.
     ///
-    /// A grid point without a trim or gain takes the design of the next higher airspeed, or of the highest with a design.
+    /// A grid point without a trim or gain takes the design of the next higher airspeed that has one. If there is none, it takes
+    /// the design of the highest airspeed that has one.
     pub(super) fn new(model: &GreyBox, weights: &Weights) -> Result<Schedule, SetupError> {
         let grid = Grid::over(&model.airframe.envelope);
         let all = (0..grid.attitudes()).into_par_iter();
@@ -159,7 +160,8 @@ impl Schedule {
         self.over_attitude(&self.comfortable, roll, pitch)
     }
 
-    /// The fraction (0..=1) of `roll` (rad) that `airspeed` (m/s) allows at `pitch` (rad).
+    /// The largest fraction (0..=1) of `roll` (rad) whose minimum airspeed without a margin is at most `airspeed` (m/s), at the
+    /// pitch angle `pitch` (rad).
     pub(super) fn tolerable_part(&self, airspeed: f64, roll: f64, pitch: f64) -> f64 {
         let allowed =
             |part: f64| self.over_attitude(&self.tolerable, part * roll, pitch) <= airspeed;
@@ -184,8 +186,8 @@ impl Schedule {
     }
 }
 
-/// The lowest airspeed (m/s) of a column at which the angle of attack is at most `alpha` (rad), linear between designs. If no
-/// design meets the limit, the result is the grid's highest airspeed.
+/// The lowest airspeed (m/s) of a column at which the angle of attack is at most `alpha` (rad), interpolated linearly between
+/// designs. If no design meets the limit, the result is the grid's highest airspeed.
 fn slowest(column: &[Option<Entry>], grid: &Grid, alpha: f64) -> f64 {
     let airspeeds = grid.airspeed;
     let needs = |k: usize| column[k].map(|entry| entry.steady[5]);
@@ -225,7 +227,8 @@ fn column(model: &GreyBox, grid: &Grid, index: usize, weights: &Weights) -> Vec<
         .collect()
 }
 
-/// The design at airspeed `k`, or at the next higher airspeed with a design, or at the highest one with a design.
+/// The design at the airspeed with index `k`. Without one, the design at the next higher airspeed that has one, or else at the
+/// highest airspeed that has one.
 fn nearest(column: &[Option<Entry>], k: usize) -> Option<Entry> {
     column[k..].iter().flatten().next().or_else(|| column.iter().flatten().last()).copied()
 }

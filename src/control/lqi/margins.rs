@@ -19,7 +19,8 @@ const LOWEST: f64 = 0.05;
 pub struct LoopMargins {
     /// The surface at which the loop is opened.
     pub surface: &'static str,
-    /// Lower and upper gain factors between which the loop stays stable. The upper one is infinite if there is no limit.
+    /// Lower and upper gain margin: the factors on the loop gain between which the loop stays stable. The upper one is infinite
+    /// if there is no limit.
     pub gain: [f64; 2],
     /// Phase margin, rad. It is π if the loop gain never crosses 1.
     pub phase: f64,
@@ -142,7 +143,7 @@ fn of_loop(surface: &'static str, ratio: &[(f64, Complex<f64>)]) -> LoopMargins 
 }
 
 impl LoopMargins {
-    /// Records a gain margin. With the gain multiplied by `factor`, the loop transfer function passes through −1.
+    /// Records a gain margin: multiplied by `factor`, the loop transfer function passes through −1.
     fn note_gain(&mut self, factor: f64) {
         let [least, most] = &mut self.gain;
         if factor < 1.0 { *least = least.max(factor) } else { *most = most.min(factor) }
@@ -156,7 +157,7 @@ mod tests {
 
     #[test]
     fn an_integrator_with_delay_has_the_margins_of_the_textbook() {
-        // L = k h z / (z (z − 1)) is k/s with half a step of delay from the hold and one step from the state
+        // L = k h / (z (z − 1)) is k/s with a delay of half a step from the hold and of one step from the second state
         let (h, k) = (STEP, 5.0);
         let a = Matrix2::new(1.0, h, 0.0, 0.0);
         let found = &each(&a, &Vector2::new(0.0, 1.0), &RowVector2::new(k, 0.0))[0];

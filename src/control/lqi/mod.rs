@@ -51,7 +51,7 @@ pub struct Lqi {
     last: Option<Given>,
 }
 
-/// Parts of the last command. The reference and the integrals are corrected with them if another command was flown.
+/// Data of the last command. If another command was flown, they serve to correct the reference and the integrals.
 #[derive(Clone, Copy, Debug)]
 struct Given {
     /// Roll and pitch of the aircraft, rad.
@@ -63,8 +63,8 @@ struct Given {
 }
 
 impl Lqi {
-    /// Designs the controller for `model` over its envelope with a margin. With a rudder the sideslip is held at zero. A turn
-    /// without a rudder has the sideslip of its equilibrium.
+    /// Designs the controller for `model` over its envelope and a margin around it. With a rudder the sideslip is held at zero.
+    /// Without a rudder a turn is flown with the sideslip of its equilibrium.
     ///
     /// # Errors
     ///
@@ -109,13 +109,13 @@ impl Lqi {
         reference
     }
 
-    /// The attitude (rad) to which the reference moves. Below the airspeed that the commanded bank needs, the bank is reduced.
+    /// Roll and pitch (rad) to which the reference moves. If the airspeed is too low for the commanded bank, the bank is reduced.
     fn wanted(&self, seen: &Observation, target: &Target) -> [f64; 2] {
         let part = self.schedule.tolerable_part(seen.state.airspeed, target.roll, target.pitch);
         [part * target.roll, target.pitch]
     }
 
-    /// The airspeed to be held (m/s): the target airspeed, or the attitude's minimum airspeed if it is higher.
+    /// The airspeed to be held (m/s): the target airspeed, or the minimum airspeed of the commanded attitude if it is higher.
     fn airspeed(&self, target: &Target) -> f64 {
         self.schedule.comfortable_airspeed(target.roll, target.pitch).max(target.airspeed)
     }
@@ -145,8 +145,8 @@ impl Lqi {
         }
     }
 
-    /// Takes over after another controller has flown. The reference starts at the present attitude. The integrators keep
-    /// their values in `before`.
+    /// Updates the LQI after another controller's command was chosen for this tick. The reference restarts at the present
+    /// attitude. The integrators return to their values in `before`.
     pub(crate) fn hand_over(&mut self, before: &Lqi, seen: &Observation) {
         self.integral = before.integral;
         self.reference = Some([seen.state.roll, seen.state.pitch]);
@@ -181,7 +181,7 @@ impl Controller for Lqi {
 
     /// Anti-windup by conditioning (Hanus, Kinnaert and Henrotte, Automatica 23, 1987). The reference moves back to the value
     /// that would have given the flown command, but not past the aircraft's attitude. The last increment of the integral is
-    /// undone.
+    /// subtracted again.
     fn overruled(&mut self, by: &Overruled) {
         let (Some(last), Some(reference)) = (self.last.take(), &mut self.reference) else { return };
         let Overruled { wanted, flown } = by;

@@ -113,7 +113,7 @@ impl Agent {
             .collect()
     }
 
-    /// Loads the policy in `folder` for `airframe`. The critics are optional, but if one exists, both must.
+    /// Loads the policy in `folder` for `airframe`. The critics are optional, but if one exists, the other must exist too.
     ///
     /// # Errors
     ///

@@ -11,7 +11,7 @@ pub const ACTIONS: usize = 3;
 /// Number of aircraft in a block, one per vector lane.
 const WIDTH: usize = 16;
 
-/// A network whose shape does not fit a policy.
+/// Error for a network whose numbers of inputs and outputs do not fit an actor or a critic.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{what} takes a network of {inputs} inputs and {outputs} outputs, not {found:?}{why}")]
 pub struct ShapeError {
@@ -87,8 +87,8 @@ impl Actor {
         [answer[0].tanh(), answer[1].tanh(), answer[2].tanh()]
     }
 
-    /// The action for a single observation, with the processor's widest vector instructions. Operations are neither fused nor
-    /// reordered. The results of all instruction sets are therefore bit-identical.
+    /// The action (−1..1) for a single observation, computed with the processor's widest vector instructions. Operations are
+    /// neither fused nor reordered. The results of all instruction sets are therefore bit-identical.
     pub fn act_one(
         &self,
         units: &mut Units<f32>,
@@ -108,8 +108,8 @@ impl Actor {
         self.act_baseline(units, observed)
     }
 
-    /// The actions of a block of aircraft. The vectors have 256 bits even if the processor has 512, because with 512 bits the
-    /// compiler does not vectorise this kernel (measured for two layers of 300: 1180 µs instead of 40 µs).
+    /// The actions (−1..1) of a block of aircraft. The vectors have 256 bits even if the processor supports 512, because the
+    /// compiler does not vectorise this kernel with 512 bits (measured for two layers of 300: 1180 µs instead of 40 µs).
     pub fn act_block(
         &self,
         units: &mut Units<Lanes<WIDTH>>,

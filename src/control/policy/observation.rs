@@ -7,8 +7,8 @@ use greylag_physics::{ActuatorState, State};
 /// Number of components of an observation.
 pub const OBSERVATIONS: usize = 16;
 
-/// Scale of each component in the order of [`observe`], in rad, m/s, rad/s and throttle (0..1). With it brisk flight, full
-/// deflection and the initial error of a hard target are of order one.
+/// Scale of each component in the order of [`observe`], in rad, m/s, rad/s and throttle (0..1). The components are divided by
+/// these scales. In brisk flight, at full deflection and at the start of a hard target they are then of order one.
 pub const UNIT: [f64; OBSERVATIONS] =
     [1.0, 0.5, 4.0, 2.0, 1.0, 1.0, 0.2, 0.2, 0.5, 10.0, 0.5, 10.0, 0.5, 0.5, 0.25, 4.0];
 
@@ -16,9 +16,10 @@ pub const UNIT: [f64; OBSERVATIONS] =
 /// actuators δa δ̇a δe δ̇e δt, then the errors φ* − φ, θ* − θ and V_a* − V_a.
 ///
 /// The paper observes φ* and θ* instead of the errors. The information is the same, because φ and θ are observed too. The
-/// errors have their own scales, because they must converge to zero. Airspeed is relative to 16.67 m/s, throttle to one half. The paper
-/// commands the same airspeed in every episode and does not observe it. A policy trained in this way flies that airspeed
-/// at any airspeed command.
+/// errors have their own scales, because they must converge to zero. Airspeed is relative to 16.67 m/s, throttle to one half.
+///
+/// In the paper the commanded airspeed is the same in every episode and is not observed. A policy trained in this way holds
+/// that airspeed whatever airspeed is commanded.
 #[inline(always)]
 pub fn observe<R: Real>(
     state: &State<R>,

@@ -99,7 +99,7 @@ impl Limits {
             || alpha_deg[1] > self.stall_deg + room(self.stall_deg))
     }
 
-    /// Time outside each limit, s. Each sample counts with the time to the next one.
+    /// Time outside each limit, s. Each sample is weighted with the time to the next sample.
     pub(super) fn outside(&self, track: &Track) -> OutsideS {
         let mut total = OutsideS::default();
         for (moment, before, length) in track.ticks() {

@@ -23,7 +23,7 @@ const BAND: f64 = 0.05;
 /// Overshoot that counts as small, as a fraction of the step.
 const LITTLE: f64 = 0.03;
 
-/// Error that counts for the remaining time after a loss of the aircraft, degrees, sum of roll and pitch.
+/// Sum of the roll and pitch errors that is assumed for the remaining time after a loss of the aircraft, degrees.
 const LOST_DEG: f64 = 360.0;
 
 /// One sample of a flight. Unknown values are NaN, which the measures ignore.
@@ -71,7 +71,7 @@ pub struct Track {
     pub target: Target,
     /// The command before the first sample. `None` at the start of a flight.
     pub before: Option<Command>,
-    /// Time that remained when the aircraft was lost, s. Zero if it was not lost.
+    /// Time from the loss of the aircraft to the planned end of the flight, s. Zero if the aircraft was not lost.
     pub lost_s: f64,
 }
 
@@ -212,8 +212,8 @@ impl Track {
         total(parts.map(|(pair, (_, _, length))| 0.5 * length * (size(&pair[0]) + size(&pair[1]))))
     }
 
-    /// Time from the first sample to the last one at which `size` of the error exceeds `band`, plus the time that remained
-    /// when the aircraft was lost, s. NaN if the band or all errors are unknown and the aircraft was not lost.
+    /// Time from the first sample to the last sample at which `size` of the error exceeds `band`, plus `Track::lost_s`, s. NaN
+    /// if the band or all errors are unknown and the aircraft was not lost.
     fn stays(&self, errors: &[[f64; 2]], size: impl Fn(&[f64; 2]) -> f64, band: f64) -> f64 {
         let unknown = band.is_nan() || errors.iter().all(|e| size(e).is_nan());
         let Some(start) = self.moments.first().map(|m| m.time_s).filter(|_| !unknown) else {
@@ -239,7 +239,7 @@ impl Track {
         self.ticks().filter_map(changed).filter(|(by, _)| by.is_finite())
     }
 
-    /// Mean of `of` the command over the ticks.
+    /// Mean over the ticks of the function `of` of the command.
     fn share(&self, of: impl Fn(&Command) -> f64) -> f64 {
         mean(self.ticks().map(|(m, ..)| of(&m.command)))
     }
@@ -256,8 +256,8 @@ pub fn attitude_error_deg([roll, pitch]: [f64; 2], target: &Target) -> [f64; 2] 
     [wrap((roll - target.roll).to_degrees()), wrap((pitch - target.pitch).to_degrees())]
 }
 
-/// Largest excursion of the error past zero in the direction of the step. Without a step, the largest |error|. NaN for no
-/// errors.
+/// Largest excursion of the error past zero in the direction of the step. Without a step, it is the largest |error|. NaN if
+/// there are no errors.
 fn overshoot(mut errors: impl Iterator<Item = f64>) -> f64 {
     let Some(first) = errors.next() else { return f64::NAN };
     let beyond = |e: f64| if first == 0.0 { e.abs() } else { -first.signum() * e };

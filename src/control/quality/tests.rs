@@ -37,7 +37,8 @@ fn track(seconds: f64, [roll, pitch]: [f64; 2], moment: impl Fn(f64) -> Moment) 
     Track { moments, target, before: None, lost_s: 0.0 }
 }
 
-/// A first-order approach to a roll of 40° with a time constant of 0.5 s has integral, times and overshoot in closed form.
+/// For a first-order approach to a roll of 40° with a time constant of 0.5 s, the integral, the settling times and the overshoot
+/// have closed forms.
 #[test]
 fn an_exponential_approach_has_the_integral_and_times_of_its_formula() {
     let tau = 0.5;
@@ -45,16 +46,16 @@ fn an_exponential_approach_has_the_integral_and_times_of_its_formula() {
     let flight =
         track(8.0, [40.0, 0.0], |t| Moment { attitude: [roll(t).to_radians(), 0.0], ..level(t) });
     let q = flight.quality(&LIMITS);
-    // ∫ 40 e^(−t/τ) = 40 τ, to which trapezoids of 0.01 s add the fraction (dt/τ)²/12
+    // ∫ 40 e^(−t/τ) dt = 40 τ. The trapezoidal rule with steps of 0.01 s is too high by the fraction (dt/τ)²/12
     assert!((q.error_integral_deg_s - 20.0).abs() < 20.0 * 4e-5, "{q:?}");
-    // the time ends at the last tick outside the band, within one tick of τ ln(40/1) and τ ln(20)
+    // each settling time is that of the last tick outside the band, which is within one tick of τ ln(40/1) or τ ln(20)
     assert!((q.to_one_deg_s - tau * 40f64.ln()).abs() <= STEP);
     assert!((q.to_five_percent_s - tau * 20f64.ln()).abs() <= STEP);
     assert_eq!(q.overshoot_deg, [0.0, 0.0]);
     assert!((q.step_deg[0] - 40.0).abs() < 1e-9 && q.step_deg[1].abs() < 1e-9);
 }
 
-/// A second-order step of damping ζ overshoots by exp(−πζ/√(1 − ζ²)) of the step, in either direction.
+/// The step response of a second-order system with damping ζ overshoots by the fraction exp(−πζ/√(1 − ζ²)) of the step.
 #[test]
 fn a_second_order_step_overshoots_as_its_damping_says() {
     let (zeta, omega) = (0.4_f64, 4.0);
@@ -69,7 +70,7 @@ fn a_second_order_step_overshoots_as_its_damping_says() {
     });
     let expected = (-std::f64::consts::PI * zeta / damped).exp();
     let q = flight.quality(&LIMITS);
-    // near the peak, a sample up to half a tick away is low by at most (ωd dt)²/8 of the overshoot
+    // a sample up to half a tick from the peak is low by at most the fraction (ωd dt)²/8 of the overshoot
     assert!((q.overshoot_deg[0] / 50.0 - expected).abs() < 3e-4 * expected, "{q:?}");
     assert!((q.overshoot_deg[1] / 20.0 - expected).abs() < 3e-4 * expected, "{q:?}");
 }
@@ -118,7 +119,7 @@ fn a_sine_of_a_surface_travels_four_amplitudes_a_period() {
     assert_eq!([q.surface_saturated, q.saturated.throttle], [0.0; 2]);
 }
 
-/// The change from the command before a new target counts if there was such a command.
+/// The change from the last command before a new target is included, if there was such a command.
 #[test]
 fn the_first_change_counts_from_the_command_before() {
     let command = Command { aileron: 0.5, ..Command::IDLE };

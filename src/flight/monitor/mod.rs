@@ -3,9 +3,9 @@
 //! For each channel (specific force or angular acceleration) the residual is the measurement minus the prediction at
 //! the measured state and surfaces. The band is two standard deviations of the prediction. This standard deviation
 //! combines those of the model's coefficients (15 % if the model file states none) and those of the measured inputs.
-//! Without incidence vanes, gusts are included. A channel outside its band for 2 s is reported once. It is reported
-//! again only after its residual has stayed below 0.7 of the half width for 5 s. Deviations in the same plane within 20
-//! s are attributed to one cause and not reported again.
+//! Without incidence vanes it includes the effect of gusts. A channel outside its band for 2 s is reported once. It is
+//! reported again only after its residual has stayed below 0.7 of the band's half width for 5 s. Deviations of several
+//! channels of one plane of motion (longitudinal or lateral) within 20 s are attributed to one cause and reported once.
 //!
 //! No command depends on the monitor.
 
@@ -23,9 +23,9 @@ use greylag_physics::{State, Time};
 
 /// Accepted sample intervals for differencing body rates, s.
 const STEPS_S: std::ops::RangeInclusive<f64> = 0.002..=0.05;
-/// Deviations in one plane within this time are attributed to one cause, s.
+/// Deviations in one plane of motion within this time (s) are attributed to one cause.
 const ONE_CAUSE_S: f64 = 20.0;
-/// Fraction of the envelope's smallest airspeed below which nothing is compared.
+/// The monitor does not compare below this fraction of the envelope's smallest airspeed.
 const SLOWEST: f64 = 0.8;
 
 /// Measurement and prediction of one channel: m/s² for specific forces, rad/s² for angular accelerations.
@@ -46,7 +46,7 @@ pub struct Monitor {
     predictor: Predictor,
     slowest: f64,
     last: Option<Seen>,
-    /// Whether each channel was compared at the last state. Residuals of the other channels are unknown.
+    /// Whether each channel was compared at the last state. Otherwise its residual is unknown.
     compared: [bool; 6],
     /// Measured and predicted values at the last comparison.
     values: [[f64; 2]; 6],

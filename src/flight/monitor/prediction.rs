@@ -18,8 +18,8 @@ const THROTTLE_SD: f64 = 0.02;
 /// is 1.9 σ_w / √(L b).
 const GUSTS_MPS: f64 = 1.5;
 const GUST_SCALE_M: f64 = 533.0;
-/// Largest step of the finite differences in α and β, rad. A step by the standard deviation of a gust could end beyond
-/// the stall, where lift drops.
+/// Largest step of the finite differences in α and β, rad. A step as large as the standard deviation in gusts could
+/// exceed the stall angle, where lift drops.
 const INCIDENCE_STEP: f64 = 2.0 * DEGREE;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
@@ -41,13 +41,13 @@ struct Asked {
     altitude: f64,
 }
 
-/// Adds one standard deviation to one uncertain input of the model.
+/// Adds its step to one uncertain input of the model.
 type Change = fn(&mut Asked, &Deviations);
 
-/// Standard deviations that vary in flight.
+/// Steps of the inputs whose standard deviations depend on the aircraft or on the sample.
 #[derive(Clone, Copy, Debug)]
 struct Deviations {
-    /// α and β, rad.
+    /// α and β, rad: their standard deviations, at most `INCIDENCE_STEP`.
     incidence: [f64; 2],
     /// Rotation of the air, rad/s.
     air_rotation: f64,

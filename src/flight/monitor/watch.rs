@@ -1,11 +1,12 @@
 //! Monitor of one channel: size of its residual relative to the band, and duration outside the band.
 
-/// Time constant of the residual's low-pass, s: five samples of differenced gyro signals.
+/// Time constant of the low-pass filter of the residual, s. The filter attenuates the noise of differenced gyro
+/// signals.
 const SMOOTHED_S: f64 = 0.1;
 /// Averaging time of the root mean squares of residual and band, s. An oscillating residual then counts like a constant
 /// residual of the same root mean square.
 const EFFECTIVE_S: f64 = 0.5;
-/// Averaging time of the correlation of surface and residual, s.
+/// Averaging time of the correlation between surface deflection and residual, s.
 const COMPARED_S: f64 = 3.0;
 /// Half width of the band in standard deviations.
 const BAND: f64 = 2.0;
@@ -14,8 +15,8 @@ const OUTSIDE_S: f64 = 2.0;
 /// Condition for a further report: the residual stays below this fraction of the band for this time, s.
 const QUIET: f64 = 0.7;
 const QUIET_S: f64 = 5.0;
-/// Correlation above which a residual follows a surface, and the smallest standard deviation of the surface for the
-/// test, rad.
+/// Magnitude of the correlation above which a residual follows its surface, and the smallest standard deviation of the
+/// deflection for this test, rad.
 const FOLLOWS: f64 = 0.8;
 const MOVES: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
@@ -84,7 +85,7 @@ impl Watch {
 
 impl Follows {
     fn see(&mut self, surface: f64, residual: f64, dt: f64) {
-        // a growing average at first: the initial value gets no extra weight
+        // a plain mean until `COMPARED_S` has passed, so that the first sample has no extra weight
         self.seen_s += dt;
         let weight = dt / self.seen_s.min(COMPARED_S);
         let towards = |from: &mut f64, to: f64| *from += (to - *from) * weight;
@@ -128,7 +129,7 @@ mod tests {
     #[test]
     fn a_residual_outside_its_band_departs_after_two_seconds_and_once() {
         let times = departures(60.0, |_| 3.0);
-        // The filters first rise to the band, two thirds of the step. Then 2 s outside the band pass.
+        // The band is two thirds of the step. The filtered residual first rises to the band, then is outside for 2 s.
         assert!(times.len() == 1 && (2.2..3.0).contains(&times[0]), "{times:?}");
         assert_eq!(departures(60.0, |_| 1.8), [0.0; 0], "inside");
         let burst = |t: f64| if (10.0..11.0).contains(&t) { 6.0 } else { 0.0 };

@@ -8,11 +8,11 @@ use greylag_link::autopilot::Severity;
 use greylag_link::vehicle::Axis;
 use greylag_physics::{Command, Time};
 
-/// After an oscillation, deflections deviate from their running mean by this fraction only. The loop gain at the
+/// Factor on the deviations of the deflections from their running mean after an oscillation. The loop gain at the
 /// oscillation frequency falls by the same factor, and the delay margin grows by about its inverse.
 const REDUCED_GAIN: f64 = 1.0 / 3.0;
-/// Time constant of the running mean of the deflections, s. A limit cycle of 1 to 8 Hz averages out. The deflections of
-/// a turn remain.
+/// Time constant of the running mean of the deflections, s. A limit cycle of 1 to 8 Hz averages out. The constant
+/// deflections of a turn remain.
 const MEAN_S: f64 = 0.5;
 /// Duration of the reduced gain after an oscillation, s.
 const REDUCED_S: f64 = 5.0;
@@ -34,7 +34,7 @@ impl Pilot {
         self.texts.say(Severity::Error, words);
     }
 
-    /// `command`, or the recovery roll to level wings while the aircraft is upset.
+    /// Returns `command`, or full aileron towards level wings while the aircraft is upset. `roll` is the bank, rad.
     fn upright(&mut self, command: Command, roll: f64) -> Command {
         if self.by_attitude {
             return command;

@@ -9,8 +9,8 @@ use greylag_physics::Time;
 /// Least time between two warnings of the same kind, s.
 const COMPLAINT_INTERVAL_S: f64 = 5.0;
 
-/// Delay of airspeed and altitude above which a warning is sent, s. After a gap in telemetry they normally follow
-/// within 20 ms.
+/// Delay of airspeed and altitude above which a warning is sent, s. After a gap in telemetry, airspeed and altitude
+/// normally arrive within 20 ms.
 const LATE_AIR_S: f64 = 0.5;
 
 /// Time of the last report of each kind. The end of the controller is reported once.
@@ -39,7 +39,7 @@ impl Pilot {
     }
 }
 
-/// Whether a warning may be repeated at `now`. Records the time if so.
+/// Whether a warning that was last sent at `last` may be sent again at `now`. If so, sets `last` to `now`.
 pub(super) fn due(last: &mut Option<Time>, now: Time) -> bool {
     let silent = within(*last, now, COMPLAINT_INTERVAL_S);
     if !silent {

@@ -1,13 +1,13 @@
 //! Settings of the pilot: envelope, timeouts, slew limits, and the trim of straight flight.
 //!
-//! "Level trim" stands for [`Trim::straight`] with level wings. It is level flight, or a descent at idle throttle at
-//! airspeeds at which no throttle holds level flight.
+//! "Level trim" stands for [`Trim::straight`] with level wings. At airspeeds for which a throttle between idle and full
+//! suffices, it is level flight. At other airspeeds it is a descent at idle throttle.
 
 use super::polarity::Answers;
 use greylag_model::{GreyBox, Trim, TrimError};
 use greylag_physics::airframe::Envelope;
 
-/// Airspeed step between two rows of the trim table, m/s. Interpolated pitch has an error below 0.1°.
+/// Airspeed step between two rows of the trim table, m/s. The error of the interpolated pitch is below 0.1°.
 const TRIM_SPACING: f64 = 1.0;
 
 /// The pilot's settings. The field names contain the units, because parameters and files show these names.
@@ -32,7 +32,7 @@ pub struct Config {
     /// Trim of straight flight with level wings ([`Trim::straight`]), by rising airspeed. Rows without level trim are
     /// glides at idle throttle.
     pub trim: Vec<TrimPoint>,
-    /// Modelled responses to the surfaces for the sign check; `None` omits the check.
+    /// Modelled responses to the surfaces for the polarity check; `None` omits the check.
     pub answers: Option<Answers>,
 }
 
@@ -101,7 +101,8 @@ impl Config {
 }
 
 fn trim_row(model: &GreyBox, airspeed: f64) -> Result<TrimPoint, TrimError> {
-    // trim depends on equivalent airspeed, which changes by 5 % per 1000 m of altitude at a given true airspeed
+    // the table holds for the reference altitude: trim depends on equivalent airspeed, which changes by 5 % per 1000 m
+    // at a given true airspeed
     let trim = Trim::straight(model, airspeed, model.airframe.reference.altitude)?;
     let command = model.airframe.actuators.command(&trim.controls);
     Ok(TrimPoint {

@@ -63,7 +63,7 @@ pub enum Source {
     Level,
     /// The pilot's stick positions as surface and throttle commands.
     Sticks,
-    /// Level trim with the small pulses of the sign check.
+    /// Level trim with the small pulses of the polarity check.
     Check,
     /// Disarmed: all outputs are zero.
     Disarmed,
@@ -103,13 +103,13 @@ pub struct Decision {
     pub target: Target,
     /// Whether a failsafe is active.
     pub failsafe: bool,
-    /// Fault found by the sign check or the oscillation guard since arming; `None` without a fault.
+    /// Fault found by the polarity check or the oscillation guard since arming; `None` without a fault.
     pub refused: Option<Fault>,
 }
 
 impl Decision {
-    /// The demand on the vehicle. A fault returns control to a real flight controller, which has its own sensors.
-    /// Faults are an unusable state, an active failsafe, and what the sign check or the oscillation guard found.
+    /// The demand on the vehicle. A fault returns control to a real flight controller, which has its own sensors. Such
+    /// faults are an unusable state, an active failsafe, and a finding of the polarity check or the oscillation guard.
     pub fn demand(&self) -> Demand {
         let fault = match (self.source, self.failsafe) {
             (Source::Level, _) => Some(Fault::State),

@@ -6,7 +6,8 @@ use super::telemetry::{defect, repeats};
 use greylag_link::vehicle::Telemetry;
 use greylag_physics::Time;
 
-/// Largest step back of vehicle time that is not a restart. Reordered frames step back by one or two cycles only.
+/// Largest step back of vehicle time that does not count as a restart of the vehicle. Reordered frames step back by one
+/// or two cycles only.
 pub(super) const RESTART: Duration = Duration::from_secs(1);
 
 /// Usability of a frame.
@@ -16,7 +17,8 @@ pub(super) enum Frame {
     Usable,
     /// A state equal bit by bit to the previous state. It is usable for a short time, but not fresh.
     Frozen,
-    /// A frame not newer than the last frame, for which a command was already decided.
+    /// A repeated or reordered frame, whose time is not after that of the newest frame. A command for the newest frame
+    /// was already decided.
     Repeated,
     /// The state is unusable, for this reason.
     Defective(&'static str),
@@ -58,14 +60,14 @@ impl Estimate {
         self.newest.is_some_and(|newest| newest.since(frame.time) > RESTART)
     }
 
-    /// Counts an unchanged state as fresh at `now`, if it is constant for a known reason.
+    /// Counts an unchanged state as fresh at `now`. To be called if there is a reason for which it is constant.
     pub(super) fn refresh(&mut self, now: Time) {
         if self.usable_at.is_some() {
             self.fresh_at = Some(now);
         }
     }
 
-    /// Excludes `missed`, a stall of this computer, from the ages of the state.
+    /// Excludes `missed`, the length of a stall of this computer, from the age of the state.
     pub(super) fn excuse(&mut self, missed: Duration) {
         for at in [&mut self.usable_at, &mut self.fresh_at].into_iter().flatten() {
             *at = at.plus(missed);
@@ -94,6 +96,6 @@ impl Estimate {
 
 /// Whether `then` lies at most `limit_s` before `now`.
 pub(super) fn within(then: Option<Time>, now: Time, limit_s: f64) -> bool {
-    // half a microsecond of tolerance, because the limit itself still counts
+    // a tolerance of half a microsecond, so that a time exactly at the limit still counts
     then.is_some_and(|then| now.since(then).as_secs_f64() <= limit_s + 5e-7)
 }

@@ -8,8 +8,9 @@ use super::{Complaints, Pilot};
 use greylag_link::autopilot::{Mode, Severity};
 use greylag_physics::Time;
 
-/// Largest change of a command that may leave the state unchanged, as a fraction of full deflection. An aileron change
-/// of 0.005 rolls the X8 at 0.85 °/s (Clδa δa / Clp · 2V/b), above the resolution of any sensor.
+/// Largest change of a command that may leave the state unchanged, as a fraction of full deflection. A larger change
+/// must be visible in the rates: an aileron change of 0.005 rolls the X8 at 0.85 °/s (Clδa δa / Clp · 2V/b), above the
+/// resolution of any gyro.
 const UNFELT_TRAVEL: f64 = 0.005;
 
 /// Time after which constant sensor values under changing commands count as frozen, s. In this time an aircraft at its
@@ -45,8 +46,8 @@ impl Pilot {
         self.estimate.fresh_within(self.clock, limit)
     }
 
-    /// Excludes `missed`, a stall of this computer, from the ages of state, setpoints and sticks. The next state is
-    /// treated as if there had been no stall.
+    /// Excludes `missed`, the length of a stall of this computer, from the ages of state, setpoints and sticks. The
+    /// next state is treated as if there had been no stall.
     pub fn excuse(&mut self, missed: Duration) {
         self.estimate.excuse(missed);
         let later = |at: &mut Time| *at = at.plus(missed);

@@ -8,12 +8,15 @@ use greylag_physics::Command;
 pub const TICK_S: f64 = 0.01;
 /// Range of airspeed over which pitch protection fades in, m/s.
 const PROTECTION_BAND: f64 = 2.0;
-/// Upper pitch limit at the minimum airspeed and below, rad: clearly nose down, not a dive.
+/// Upper pitch limit at the minimum airspeed and below, rad. The nose is then clearly down, but the aircraft does not
+/// dive.
 const RECOVERY_PITCH: f64 = -5.0 * DEGREE;
-/// Lower pitch limit at the maximum airspeed and above, rad: clearly nose up, not a climb.
+/// Lower pitch limit at the maximum airspeed and above, rad. The nose is then clearly up, but the aircraft does not
+/// climb.
 const ARREST_PITCH: f64 = 5.0 * DEGREE;
 /// Load factor available at the minimum airspeed. This airspeed is about 1.41 times the stall speed (13 and 9.2 m/s for
-/// the X8): the lift allows a load factor of 2. A margin of 1.2 on the stall speed in a turn reduces it to 2 / 1.2².
+/// the X8), so the lift allows a load factor of 2. A margin of 1.2 above the stall speed in a turn reduces it to 2 /
+/// 1.2².
 const LOAD_AT_MINIMUM: f64 = 2.0 / 1.44;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
@@ -95,7 +98,7 @@ impl Limits {
     }
 
     /// `wanted`, limited to its range and to a change of one slew step from `last`. An actuator whose command is NaN
-    /// keeps its last command: every later step from NaN would panic in the clamp.
+    /// keeps its last command, because a NaN would make the clamp of the next tick panic.
     pub fn slew(&self, last: Command, wanted: Command) -> Command {
         let wanted = wanted.clamped();
         let near = |from: f64, to: f64, step: f64| {
@@ -208,7 +211,8 @@ mod tests {
         let e = x8();
         let pitch =
             |wanted: f64, airspeed: f64| e.limit(wish(0.0, wanted), airspeed).pitch.to_degrees();
-        // Halfway and at a quarter of the band: between −5° and 30° when slow, between 5° and −30° when fast.
+        // At half and at a quarter of the band, the limit lies between −5° and 30° near the minimum airspeed, and
+        // between 5° and −30° near the maximum.
         for (wanted, airspeed, limited) in [
             (90.0, 14.0, 12.5),
             (90.0, 13.5, 3.75),

@@ -83,17 +83,17 @@ pub struct Pilot {
     sticks: Option<(Time, Sticks)>,
     setpoint_lost: bool,
     vehicle_lost: bool,
-    /// Whether a loss of the vehicle was reported and its recovery was not.
+    /// Whether a loss of the vehicle was reported and its recovery not yet.
     loss_reported: bool,
     /// Vehicle time at which the vehicle link last recovered.
     vehicle_back: Option<Time>,
     /// Vehicle time since which airspeed and altitude are missing.
     air_late: Option<Time>,
-    /// Roll and pitch (rad) of the setpoint whose limitation was reported.
+    /// Roll and pitch (rad) of the last setpoint whose limitation by the envelope was reported.
     cut: Option<[f64; 2]>,
     /// The last command, after slew limits.
     in_force: Command,
-    /// The command of the previous tick. Ticks with a repeated state are skipped.
+    /// The command before the last command. Ticks with a repeated state do not count.
     before: Command,
     /// The command in force when the state last changed.
     last_moved: Command,
@@ -105,7 +105,7 @@ pub struct Pilot {
     complaints: Complaints,
     load: f64,
     programme: Option<Programme>,
-    /// The sign check of the surfaces, if enabled.
+    /// The polarity check of the surfaces, if enabled.
     check: Option<Check>,
     /// The guard against oscillations.
     oscillation: Oscillation,
@@ -115,11 +115,11 @@ pub struct Pilot {
     by_attitude: bool,
     /// Time of the last oscillation. The gain is reduced for a while after an oscillation.
     oscillated: Option<Time>,
-    /// Low-pass of the controller's commands, and the time of its last update.
+    /// Time of the last update, and low-pass of the controller's commands at that time.
     mean: Option<(Time, Command)>,
     /// Whether the recovery from an upset is active.
     upset: bool,
-    /// Fault found by the sign check or the oscillation guard since arming; `None` without a fault.
+    /// Fault found by the polarity check or the oscillation guard since arming; `None` without a fault.
     refused: Option<Fault>,
     /// The model monitor, if set.
     monitor: Option<Monitor>,
@@ -131,7 +131,7 @@ pub struct Pilot {
     overruled: Option<Overruled>,
 }
 
-/// Result of `observe` for `decide`.
+/// Result of `observe`, on which `decide` acts.
 #[derive(Clone, Copy, Debug)]
 enum Pending {
     Disarmed,
@@ -206,8 +206,8 @@ impl Pilot {
         self.programme = Some(Programme::new(schedule));
     }
 
-    /// Configures the pilot for `vehicle`. If surface commands pass through a flight controller, their signs are
-    /// checked. If attitude setpoints are sent, sign checks and the oscillation guard are off.
+    /// Configures the pilot for `vehicle`. If surface commands pass through a flight controller, the polarity check is
+    /// enabled. If attitude setpoints are sent, the polarity check and the oscillation guard are off.
     pub fn take_on(&mut self, vehicle: &Vehicle) {
         self.by_attitude = !vehicle.flies_surfaces();
         if vehicle.has_channels() {
@@ -215,14 +215,14 @@ impl Pilot {
         }
     }
 
-    /// Enables the check of surface signs at every engagement. Control is returned to the flight controller if a sign
-    /// is wrong or the loop oscillates persistently. Without modelled responses in the settings no signs are checked.
+    /// Enables the polarity check of the surfaces at every engagement. Control is returned to the flight controller if
+    /// a sign is wrong or the loop oscillates persistently. It needs the modelled responses in the settings.
     pub fn check_signs(&mut self) {
         self.hands_back = true;
         self.check = self.config.answers.clone().map(Check::new);
     }
 
-    /// Registers that the flight controller has given control authority, and starts the sign check.
+    /// Registers that the flight controller has given control authority, and starts the polarity check.
     pub fn engaged(&mut self, now: Time) {
         self.advance(now);
         (self.oscillation, self.oscillated, self.mean) = (Oscillation::default(), None, None);
@@ -384,7 +384,7 @@ impl Pilot {
         self.target = self.limits.limit(wish, frame.state.airspeed);
         self.report_limits(&wish);
         let Telemetry { time, mut state, actuators, altitude, .. } = frame;
-        // Sensor noise at zero airspeed may be negative.
+        // Sensor noise makes an airspeed near zero negative at times.
         state.airspeed = state.airspeed.max(0.0);
         Pending::Fly {
             seen: Observation {

@@ -145,7 +145,7 @@ impl Autopilot for Pilot {
 
     fn attitude_setpoint(&mut self, now: Time, setpoint: AttitudeSetpoint) {
         self.advance(now);
-        // the pilot does not rely on the link for finite setpoints
+        // the pilot does not rely on the link to refuse setpoints that are not finite
         if setpoint.roll.is_finite() && setpoint.pitch.is_finite() {
             let thrust = setpoint.thrust.filter(|x| x.is_finite());
             self.setpoint = Some((now, AttitudeSetpoint { thrust, ..setpoint }));

@@ -1,10 +1,10 @@
-//! The oscillation guard detects a limit cycle of the loop through a surface at its limits.
+//! The oscillation guard detects a limit cycle in which the surface command reaches its limits.
 //!
 //! A loop with more delay than its margin can enter a limit cycle that the surface's slew limit sustains. The X8,
-//! commanded through ArduPlane's channels, oscillated for 50 s at 2.6 Hz with pitch rates up to 228 °/s. Every state
-//! was fresh and every command was in range. The guard looks for a rate that changes sign repeatedly. In each half
-//! period the command must be at its limit, or sweep over half of its travel. A manoeuvre shows this once or twice.
-//! Turbulence does not move a command this far.
+//! commanded through ArduPlane's RC channels, oscillated for 50 s at 2.6 Hz with pitch rates up to 228 °/s. Every state
+//! was fresh and every command was in range, so no other check detected it. The guard looks for a rate that changes
+//! sign repeatedly. In each half period the command must be at its limit, or sweep over half of its travel. A manoeuvre
+//! shows this once or twice. Turbulence does not move a command this far.
 
 use super::limits::TICK_S;
 use greylag_link::vehicle::Axis;
@@ -12,22 +12,22 @@ use greylag_physics::{Command, State, Time};
 
 /// Time constant of the high-pass on the rate, s. The high-pass removes the pitch rate of a steady turn.
 const SLOW_S: f64 = 0.5;
-/// Range of half periods, s: 1 to 8 Hz. Slower motion is flight dynamics. Faster motion is structural vibration or
-/// noise.
+/// Range of the half periods of a limit cycle, s (1 to 8 Hz). Slower motion is flight dynamics. Faster motion is
+/// structural vibration or noise.
 const HALF_SWING_S: [f64; 2] = [0.06, 0.5];
 /// Smallest peak rate of a half period, rad/s (23 °/s). It is three times the peak in light turbulence and a quarter of
-/// the mildest observed limit cycle (pitch 4° rms at 2.6 Hz is 90 °/s).
+/// the peak in the mildest observed limit cycle (90 °/s: a pitch of 4° rms at 2.6 Hz).
 const PEAK: f64 = 0.4;
 /// Dead band for the sign of the rate, rad/s (3 °/s): ten times the noise of a gyro.
 const NO_SIGN: f64 = 0.05;
 /// Smallest fraction of a half period with the command at its slew limit or stop: a fifth, less a tolerance for
 /// rounding.
 const LIMITED: f64 = 0.2 - 1e-6;
-/// Sweep of the command that qualifies a half period without the limit: half of the travel from −1 to 1. With a delay
-/// of 60 ms a limit cycle hardly reaches the limits.
+/// Sweep of the command that qualifies a half period in which the command does not reach a limit: half of the travel
+/// from −1 to 1. With a delay of 60 ms the command of a limit cycle hardly reaches its limits.
 const SWEPT: f64 = 1.0;
-/// Number of consecutive half periods, and their total duration in s, that count as an oscillation. A step between ±60°
-/// has three half periods.
+/// Number of consecutive half periods, and their total duration in s, that count as an oscillation. The response to a
+/// step between ±60° of bank has three half periods.
 const SWINGS: u32 = 4;
 const LONG_S: f64 = 0.6;
 /// Fraction of the slew limit or of full travel above which a command is at its limit.
@@ -68,9 +68,10 @@ pub(super) struct Oscillation {
 }
 
 impl Oscillation {
-    /// Processes a tick: its time and state, the commands before and after it, and the largest change of a surface per
-    /// tick. Returns the oscillating axis and the duration of the oscillation, s; `None` without an oscillation.
-    /// Durations are measured by time, not by ticks, because an overloaded processor skips ticks.
+    /// Processes the tick at `time`: its state, the commands `before` and `now` of the previous and this tick, and the
+    /// largest change `step` of a surface command per tick. Returns the oscillating axis and the duration of the
+    /// oscillation, s; `None` without an oscillation. Durations are measured by time, not by ticks, because an
+    /// overloaded processor skips ticks.
     pub(super) fn see(
         &mut self,
         time: Time,
@@ -93,7 +94,8 @@ impl Oscillation {
 }
 
 impl Swings {
-    /// Duration of the oscillation, s; `None` without an oscillation.
+    /// Processes a tick that follows the previous one by `passed` s. Returns the duration of the oscillation, s; `None`
+    /// without an oscillation.
     fn see(&mut self, passed: f64, rate: f64, command: f64, limited: bool) -> Option<f64> {
         if !rate.is_finite() {
             return None;
@@ -134,8 +136,8 @@ mod tests {
     /// Largest change of a command in a tick at the X8's slew limit of 20 /s.
     const STEP: f64 = 0.2;
 
-    /// Time at which the guard trips, s, for a pitch rate (rad/s) and an elevator command before slew limits, as
-    /// functions of time (s).
+    /// Time (s) at which the guard trips; `None` if it does not. `rate` is the pitch rate (rad/s) and `wanted` the
+    /// elevator command before slew limits, as functions of time (s).
     fn trips(seconds: f64, rate: impl Fn(f64) -> f64, wanted: impl Fn(f64) -> f64) -> Option<f64> {
         let mut guard = Oscillation::default();
         let mut before = Command::IDLE;

@@ -1,4 +1,4 @@
-//! The pilot during the sign check, from arming to the verdict.
+//! The pilot during the polarity check, from arming to the verdict.
 
 use super::estimate::Frame;
 use super::polarity::Verdict;
@@ -7,8 +7,8 @@ use greylag_link::autopilot::Severity;
 use greylag_physics::{Command, Time};
 
 impl Pilot {
-    /// Passes the state to the sign check. Returns the pending decision during the check and after a fault; otherwise
-    /// `None`.
+    /// Passes the state to the polarity check. Returns the action of this tick during the check and after a fault;
+    /// otherwise `None`.
     pub(super) fn check_polarity(&mut self, quality: Frame) -> Option<Pending> {
         if self.refused.is_none() && !self.check.as_ref()?.is_open() {
             return None;

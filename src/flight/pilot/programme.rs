@@ -50,7 +50,8 @@ impl Programme {
         demand.target
     }
 
-    /// `own` plus the excitation of the last target; `own` without an active target.
+    /// Adds the excitation of the schedule to the command `own`. Returns `own` unchanged if no target was requested
+    /// since the last call.
     pub(super) fn excite(&mut self, own: Command) -> Command {
         match self.demand.take() {
             Some(demand) => self.overlay.command(&demand, own),

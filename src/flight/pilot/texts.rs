@@ -17,7 +17,7 @@ impl Texts {
     pub(super) fn say(&mut self, severity: Severity, words: impl Into<String>) {
         self.waiting.push_back(Text { severity, words: words.into() });
         if self.waiting.len() > CAPACITY {
-            // `Severity` is ordered from the most severe on
+            // `Severity` is ordered from the most to the least severe
             let least = self.waiting.iter().map(|text| text.severity).max();
             if let Some(at) = self.waiting.iter().position(|text| Some(text.severity) == least) {
                 self.waiting.remove(at);

@@ -42,7 +42,7 @@ impl Pilot {
         }
     }
 
-    /// Reports that the envelope limits a client's attitude: once per setpoint, and at most once in 5 s.
+    /// Reports that the envelope limits a client's attitude setpoint: once per setpoint, and at most once in 5 s.
     pub(super) fn report_limits(&mut self, wish: &Target) {
         let cut = |wanted: f64, flown: f64| (wanted - flown).abs() > REPORTED_CUT;
         let (roll, pitch) = (cut(wish.roll, self.target.roll), cut(wish.pitch, self.target.pitch));

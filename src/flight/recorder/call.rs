@@ -1,4 +1,5 @@
-//! Calls of the pilot as lines of `flight.calls`. Calls and vehicle frames together are all inputs of the pilot.
+//! Calls of the pilot as lines of `flight.calls`. Together with the frames of the vehicle they are all inputs of the
+//! pilot.
 
 use std::fmt;
 use std::str::FromStr;
@@ -24,20 +25,20 @@ pub enum Planned {
     None,
 }
 
-/// One call of the pilot. Its numbers are written so that they can be read back to the bit.
+/// One call of the pilot. Its numbers are written so that they read back bit by bit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Call {
     /// Vehicle time was advanced to this time.
     Advance(Time),
     /// This computer had stalled for this time.
     Excuse(Duration),
-    /// The state of this vehicle time was observed. The planner's reply and the resulting command follow.
+    /// The state of this vehicle time was observed. The other fields are the planner's reply and the resulting command.
     Tick(Time, Planned, Command),
     /// Arming was requested at this vehicle time. The flag is set if it was forced.
     Arm(Time, bool),
     /// Disarming was requested at this vehicle time. The flag is set if it was forced.
     Disarm(Time, bool),
-    /// The flight controller gave control authority.
+    /// The flight controller gave control authority to the companion at this vehicle time.
     Engaged(Time),
     /// A mode was requested at this vehicle time.
     Mode(Time, Mode),

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// Destination of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// A new folder inside this folder, with the number after the highest present: `0001`, `0002` …
+    /// A new folder inside this folder: `0001`, `0002` … Its number is one above the highest number present.
     Numbered(PathBuf),
     /// Exactly this folder, which must not exist yet.
     Exactly(PathBuf),

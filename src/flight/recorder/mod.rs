@@ -21,7 +21,7 @@ use greylag_link::framing::{FrameCounts, Frames};
 use greylag_logs::csv::Rows;
 use queue::Queue;
 
-/// Capacity of the queue: four seconds of a 100 Hz loop with its traffic.
+/// Capacity of the queue in entries: about four seconds of flight at 100 Hz with its link traffic.
 const QUEUE: usize = 4096;
 /// Longest time between the writing of an entry and its flush to the disk.
 const FLUSH_INTERVAL: Duration = Duration::from_millis(500);
@@ -223,8 +223,8 @@ impl<C: Write, T: Write, L: Write> Files<C, T, L> {
         }
     }
 
-    /// Flushes the files. A file that fails here loses entries that were counted as written. It adds one to the dropped
-    /// entries, because their number is unknown.
+    /// Flushes the files. A file that fails here loses an unknown number of entries that were counted as written, and
+    /// adds one to the dropped entries.
     fn flush(&mut self) {
         let open = self.open();
         self.csv.attempt(Rows::flush);
@@ -366,7 +366,7 @@ mod tests {
         let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
         let recorder = Recorder::over(PathBuf::from("nowhere"), full(), full(), full()).unwrap();
         recorder.row(row(1));
-        // The row fits into the buffer: the error comes when the file is closed.
+        // The row fits into the buffer, so the write fails only when the file is closed.
         assert!(recorder.finish().dropped > 0);
     }
 

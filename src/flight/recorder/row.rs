@@ -101,11 +101,11 @@ impl Row {
 
 fn sample(state: &Telemetry, decision: &Decision) -> Sample {
     let (s, z, c) = (&state.state, &state.actuators, &decision.command);
-    // a part with a fault holds its last valid value, which a log omits
+    // a quantity with a fault holds its last valid value, which the log leaves out
     let known = |fault: Faults, x: f64| {
         if state.faults.contains(fault) { f64::NAN } else { x }
     };
-    // airspeed and altitude have two faults: implausible, or stale
+    // airspeed and altitude have two fault flags: implausible, and stale
     let in_air = |x: f64| known(Faults::LATE_AIR, known(Faults::AIR, x));
     // Without a rudder both values are zero. The rudder columns then stay empty.
     let rudder =

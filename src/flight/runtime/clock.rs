@@ -18,8 +18,8 @@ pub enum Pace {
 /// 1 s.
 pub const PATIENCE: Duration = Duration::from_millis(1200);
 
-/// Longest part of an interval between two polls that counts as silence. During a stall the companion does not poll the
-/// link.
+/// Longest part of an interval between two polls that counts as silence of the vehicle. A longer interval is a stall of
+/// the companion, which does not poll the link in that time.
 const LISTENED: Duration = Duration::from_millis(100);
 
 /// Maps host time to vehicle time.
@@ -28,7 +28,7 @@ pub(super) struct Clock {
     pace: Pace,
     /// Time of the newest state.
     anchor: Option<Time>,
-    /// Silence since the anchor while the link was polled, and the time of the last poll.
+    /// Silence of the vehicle since the anchor, counted while the link was polled, and the time of the last poll.
     listened: (Duration, Option<Instant>),
 }
 
@@ -97,7 +97,8 @@ mod tests {
         for look in 1..=170 {
             clock.listen(later(10 * look));
         }
-        // Half a second after the patience has ended, vehicle time is half a second ahead: the link counts as lost.
+        // Half a second after `PATIENCE`, vehicle time is half a second after the newest state: the link counts as
+        // lost.
         assert_eq!(clock.at(later(1700)), time(5500));
         // A stall of five seconds adds only `LISTENED` of silence.
         assert_eq!(clock.at(later(6700)), time(5600));

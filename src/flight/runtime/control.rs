@@ -31,21 +31,22 @@ use greylag_physics::Time;
 const POLL: Duration = Duration::from_millis(10);
 /// Period of the control loop.
 const CYCLE: Duration = Duration::from_millis(10);
-/// Time without any state after the start after which a missing vehicle is reported.
+/// If no state has arrived by this time after the start, a missing vehicle is reported.
 const NO_VEHICLE: Duration = Duration::from_secs(2);
 /// Weight of the newest tick in the low-pass of the reported load.
 const LOAD_WEIGHT: f64 = 0.02;
 /// Ids of the autopilot in messages to clients.
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
-/// Longest wait for a live state after a stall, and the largest age of a live state.
+/// Largest age of a live state, and longest wait for a live state after a stall. Older states are left over from the
+/// stall.
 const CATCH_UP: Duration = Duration::from_millis(50);
 /// Longest wait for the network thread to deliver queued packets after a stall.
 const HAND_OVER: Duration = Duration::from_secs(2);
-/// Interval of queries to the scheduler.
+/// Interval between two readings of the scheduler's counters.
 const WAITED: Duration = Duration::from_secs(1);
 
-/// A received packet with its origin.
+/// An arrival with its origin.
 enum Arrived {
     Vehicle(Arrival),
     Client(Arrival),
@@ -57,7 +58,7 @@ pub(super) struct Control {
     planner: Planner,
     vehicle: Vehicle,
     clients: Clients,
-    /// Router between clients and a real controller.
+    /// Router between clients and a real flight controller; `None` for the simulator's shim.
     router: Option<Router>,
     ports: Ports,
     recorder: Option<Recorder>,
@@ -66,7 +67,7 @@ pub(super) struct Control {
     clock: Clock,
     timing: Timing,
     attention: Attention,
-    /// The scheduler's last counters, and the time of the next query.
+    /// The scheduler's counters at the last reading, and the time of the next reading.
     waited: Waited,
     next_waited: Instant,
     reports: Reports,
@@ -162,7 +163,7 @@ impl Control {
         match arrived {
             Some(Arrived::Vehicle(arrival)) => self.take_vehicles(Some(arrival), resumed),
             Some(Arrived::Client(arrival)) => {
-                // setpoints are stamped with vehicle time, which did not advance during the stall
+                // states come first: setpoints are stamped with vehicle time, which did not advance during the stall
                 if resumed.is_some() {
                     self.take_vehicles(None, resumed);
                 }
@@ -174,7 +175,7 @@ impl Control {
     }
 
     /// Detects a stall of this computer, waits until the network thread has delivered the packets of that time, and
-    /// excludes the stall from all timeouts. Returns the vehicle time from which states are live; `None` without a
+    /// excludes the stall from all timeouts. Returns the vehicle time from which on states are live; `None` without a
     /// stall.
     fn excuse_stall(&mut self) -> Option<Time> {
         let host = Instant::now();

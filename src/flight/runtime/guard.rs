@@ -81,7 +81,7 @@ impl Guard {
         believed
     }
 
-    /// The error of the timestamp file that was not returned yet; `None` without one.
+    /// An error of the timestamp file as text, returned once; `None` without a new error.
     pub(super) fn trouble(&self) -> Option<String> {
         self.file.trouble()
     }

@@ -2,13 +2,13 @@
 
 use std::time::{Duration, Instant};
 
-/// Delay of a thread above which it counts as stalled: ten cycles.
+/// Time without a poll after which a thread counts as stalled: ten cycles.
 const LATE: Duration = Duration::from_millis(100);
-/// Longest interval between two checks of a running thread: at least one check per cycle.
+/// Longest interval between two polls of a thread that is not stalled: it polls at least once per cycle.
 const USUAL: Duration = Duration::from_millis(10);
 /// Least time between two stall reports.
 const REPORT_INTERVAL: Duration = Duration::from_secs(5);
-/// Fraction of a stall in which the thread was runnable. Above it, other load is the cause.
+/// If the thread was runnable for at least this fraction of a stall, other load is the cause.
 const BUSY: f64 = 0.5;
 
 /// The thread that stalled.
@@ -23,7 +23,7 @@ pub(super) enum Behind {
 /// Stall detector of the control and network threads.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Attention {
-    /// Last check by the control thread.
+    /// Time of the last check, which is made by the control thread.
     looked: Instant,
     /// Rounds of the network thread, and the time of their last increase.
     network: (u64, Instant),
@@ -34,8 +34,8 @@ impl Attention {
         Attention { looked: host, network: (0, host) }
     }
 
-    /// Checks at `host`, with the number of rounds of the network thread. On a stall, returns the thread and the time
-    /// since which it did not poll.
+    /// Checks both threads at `host`. `rounds` is the number of rounds of the network thread so far. On a stall,
+    /// returns the stalled thread and the time of its last poll.
     pub(super) fn look(&mut self, host: Instant, rounds: u64) -> Option<(Behind, Instant)> {
         let looked = std::mem::replace(&mut self.looked, host);
         if rounds != self.network.0 {
@@ -55,7 +55,7 @@ impl Attention {
     }
 }
 
-/// Length of the stall from `since` to `host`, less the longest interval between two regular checks.
+/// Length of the stall from the last poll at `since` to `host`, less the longest regular interval between two polls.
 pub(super) fn lateness(since: Instant, host: Instant) -> Duration {
     host.saturating_duration_since(since).saturating_sub(USUAL)
 }
@@ -98,7 +98,8 @@ impl Waited {
     }
 }
 
-/// Rate limit of stall reports. A report is immediate, or sums up the stalls of the 5 s after the last report.
+/// Rate limit of stall reports. A stall is reported immediately. The stalls of the next 5 s are summed up in one
+/// report.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Reports {
     /// Time of the last report.
@@ -144,7 +145,7 @@ impl Reports {
     }
 }
 
-/// Text on the processor load by other work.
+/// Text that names other load on the processors, with the load average if the system has it.
 fn busy() -> String {
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
     let load = std::fs::read_to_string("/proc/loadavg").ok();

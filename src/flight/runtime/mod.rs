@@ -135,7 +135,7 @@ pub enum Event {
 pub struct Flight {
     /// Events of the flight.
     pub events: Receiver<Event>,
-    /// The bound address of the vehicle's link; `None` for `tcpout:`.
+    /// The bound address of the vehicle's link; `None` for `tcpout:` and `serial:`.
     pub vehicle: Option<SocketAddr>,
     /// The bound addresses of the clients' links, in the order of the options.
     pub clients: Vec<Option<SocketAddr>>,

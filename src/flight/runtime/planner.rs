@@ -48,7 +48,8 @@ mod tests {
         Request { observation, target, overruled: None, engage }
     }
 
-    /// A controller whose first plans wait for a release. Its throttle counts its engagements, its aileron its plans.
+    /// A controller whose first plans wait for a release. The throttle of its commands counts its engagements and the
+    /// aileron its plans, 0.1 each.
     #[derive(Clone)]
     struct Held {
         begun: Sender<()>,
@@ -78,7 +79,7 @@ mod tests {
         }
     }
 
-    /// A planner with channels that signal the start of a plan and release a waiting one.
+    /// A planner with a channel that signals the start of each plan, and a channel that releases a waiting plan.
     struct Bench {
         planner: Threaded,
         begun: Receiver<()>,

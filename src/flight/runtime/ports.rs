@@ -10,7 +10,7 @@ use greylag_link::peer::{LinkId, PeerId};
 use greylag_link::signing::SigningCounts;
 use greylag_link::transport::{Arrival, Link, Network, Packet};
 
-/// Capacity of the vehicle's queue: 2 s, longer than the control thread may stall.
+/// Capacity of the vehicle's queue in packets: about 2 s of telemetry, longer than most stalls of the control thread.
 const VEHICLE_QUEUE: usize = 256;
 /// Capacity of the clients' queue. Further packets are dropped.
 const CLIENT_QUEUE: usize = 512;
@@ -96,7 +96,7 @@ impl Ports {
         }
     }
 
-    /// The error of the signing timestamp's file that was not returned yet; `None` without one.
+    /// An error of the file of the signing timestamp as text, returned once; `None` without a new error.
     pub(super) fn trouble(&self) -> Option<String> {
         self.guard.as_ref().and_then(Guard::trouble)
     }

@@ -10,8 +10,8 @@ use super::timing::Histogram;
 const PRIORITY: i32 = 40;
 /// Period of the wake-up measurement.
 const CYCLE: Duration = Duration::from_millis(10);
-/// Limits of the wake-up latency. One wake-up in a hundred may exceed the first limit, none the second. A plan has 8 ms
-/// of a cycle of 10 ms.
+/// Limits of the wake-up latency. One wake-up in a hundred may exceed the first limit, and none may exceed the second.
+/// A plan has 8 ms in a cycle of 10 ms.
 const LATE: (Duration, Duration) = (Duration::from_millis(2), Duration::from_millis(5));
 
 /// Puts this thread, and all threads that it starts, into the scheduling class SCHED_FIFO. A thread of this class runs

@@ -2,8 +2,8 @@
 
 use std::time::{Instant, SystemTime};
 
-/// Timestamps of one recording. Changes of the time of day in flight have no effect: a replay sees the same ages.
-/// Timestamps of successive packets differ, which separates the packets.
+/// Timestamps of one recording. Changes of the system time in flight have no effect, so a replay computes the same ages
+/// of states. Timestamps of successive packets differ, which separates the packets.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stamps {
     started: Instant,

@@ -43,7 +43,7 @@ impl Summary {
     }
 }
 
-/// Quantities and units of the derivatives.
+/// Quantities and units of the derivatives, in the order of `ESTIMATES`.
 const QUANTITIES: [(&str, &str); ESTIMATES.len()] = [
     ("roll acceleration at full aileron", "rad/s2"),
     ("L_p", "1/s"),

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-/// Longest duration that is resolved to 1 µs, µs. All longer durations share one bucket.
+/// Longest duration with a bucket of its own, µs. The buckets are 1 µs wide. All longer durations share one bucket.
 const RESOLVED_US: usize = 50_000;
 
 /// A histogram of durations with a fixed size.
@@ -38,7 +38,8 @@ impl Histogram {
         self.max_us
     }
 
-    /// The quantile `share` (0..1) of the durations, µs, rounded up to the microsecond; NaN without durations.
+    /// The quantile `share` (0..1) of the durations, µs, rounded up to the microsecond and at most 50 001 µs; NaN
+    /// without durations.
     pub fn quantile_us(&self, share: f64) -> f64 {
         let rank = ((share * self.count as f64).ceil() as u64).max(1);
         let mut seen = 0;
@@ -59,8 +60,8 @@ pub struct Timing {
     pub latency: Histogram,
     /// Time between the arrivals of two state frames.
     pub interval: Histogram,
-    /// Number of missed cycles. In real time these are ticks with a latency above 10 ms. In lockstep vehicle time waits
-    /// for the reply. Missed cycles are then states that were sent again.
+    /// Number of missed cycles. In real time these are ticks with a latency above 10 ms. In lockstep these are states
+    /// that the vehicle sent again because it had no reply.
     pub missed: u64,
     /// Number of ticks without a plan in time: the plan was late, or the planner was busy with an earlier request.
     pub late_plans: u64,
@@ -91,7 +92,7 @@ impl Timing {
     }
 }
 
-/// Fraction of late cycles from which on the computer counts as too slow.
+/// Fraction of missed cycles from which on the computer counts as too slow.
 const TOO_MANY: f64 = 0.02;
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! Coordinates of the trainable coefficients. A unit of each coordinate has the same effect on the state rates.
+//! Coordinates of the trainable coefficients. A unit step of any coordinate has the same mean square effect on the
+//! state rates.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,8 +14,8 @@ use greylag_physics::{Channel, State, Wrench};
 
 /// The name under which the product of inertia is trainable.
 ///
-/// No other inertia is trainable. Scaling moments and inertias together, or forces and mass together, changes no
-/// motion. Therefore no data can separate them from the coefficients.
+/// Mass and the other inertias are not trainable. Scaling moments and inertias together, or forces and mass together,
+/// does not change the motion. Therefore no data can separate mass and inertias from the coefficients.
 pub const JXZ: &str = "rigid_body.jxz_kgm2";
 
 /// Number of samples that determine the coordinates.
@@ -23,24 +24,26 @@ const SAMPLES: usize = 4096;
 /// Eigenvalue, relative to the largest one, up to which a direction counts as unidentifiable.
 const UNSEEN: f64 = 1e-9;
 
-/// θ_p = θ_p0 + T η: η has as many entries as there are identifiable directions.
+/// Transformation θ_p = θ_p0 + T η of the coordinates η to the coefficients θ_p of the prior. η has one entry for
+/// each identifiable direction.
 ///
-/// Adam scales every parameter separately, along the given axes. Coefficients differ a thousandfold in size and are
-/// correlated (aileron power with roll damping). Therefore the axes are chosen by their effect on the rates over the
-/// flights: ∂(F_p/x_c)/∂η has unit covariance.
+/// Adam scales every parameter separately, along the given axes. But coefficients differ a thousandfold in size and
+/// are correlated (for example aileron power with roll damping). Therefore the axes are chosen by their effect on the
+/// prior's state rates F_p over the flights: ∂(F_p/x_c)/∂η has unit covariance, where x_c is the reference scale of
+/// the state.
 #[derive(Clone, Debug)]
 pub struct Basis {
     /// Indices of the coefficients in the model's list. The length of the list is the index of Jxz.
     pub places: Vec<usize>,
     /// Initial coefficients θ_p0.
     start: DVector<f64>,
-    /// Bounds that the model states, or else the physical ones; `None` without bounds.
+    /// Bounds that the model states, or else the physical bounds; `None` if a coefficient has no bounds.
     bounds: Vec<Option<(f64, f64)>>,
     /// Prior information 1/σ² on θ_p0; zero if the model's file states no σ.
     information: DVector<f64>,
     /// The transformation T.
     turn: DMatrix<f64>,
-    /// Names of the coefficients that the data does not identify, or not separately from others.
+    /// Names of the coefficients that the data does not identify, or does not separate from other coefficients.
     pub unseen: Vec<String>,
 }
 
@@ -69,7 +72,7 @@ pub enum TrainableError {
     },
 }
 
-/// Checks that the slopes of `model` can be computed for training.
+/// Checks that the derivatives of `model` can be computed for training.
 ///
 /// # Errors
 ///
@@ -121,7 +124,7 @@ pub fn value(model: &GreyBox, name: &str) -> Option<f64> {
 }
 
 impl Basis {
-    /// The coordinates of the coefficients `names` of `model` over `tracks`.
+    /// Coordinates for the coefficients `names` of `model`, from their effect over `tracks`.
     ///
     /// # Errors
     /// If the model lacks a coefficient, or one cannot be trained.
@@ -172,12 +175,13 @@ impl Basis {
         self.len() == 0
     }
 
-    /// Slopes of the coefficients over coordinate `k`, in the order of `places`.
+    /// Derivatives of the coefficients with respect to coordinate `k`, in the order of `places`.
     pub fn column(&self, k: usize) -> impl Iterator<Item = f64> + '_ {
         (0..self.turn.nrows()).map(move |i| self.turn[(i, k)])
     }
 
-    /// Slopes with respect to the coordinates from those with respect to coefficients and Jxz.
+    /// Converts a gradient with respect to coefficients and Jxz (`all`) to the gradient with respect to the
+    /// coordinates.
     pub fn slopes(&self, all: &[f64]) -> Vec<f64> {
         let of = |k: usize| {
             self.places.iter().enumerate().map(move |(i, p)| self.turn[(i, k)] * all[*p])
@@ -214,8 +218,8 @@ impl Basis {
     }
 }
 
-/// Σ (∂(F_p/x_c)/∂θ)ᵀ (∂(F_p/x_c)/∂θ) / N over samples of the tracks. Samples at which it is not finite are omitted,
-/// because the eigenvalue iteration would not end on a NaN.
+/// Mean of JᵀJ over samples of the tracks, with the Jacobian J = ∂(F_p/x_c)/∂θ. Samples with a J that is not finite
+/// are omitted, because the eigenvalue iteration would not end on a NaN.
 fn gram(model: &GreyBox, places: &[usize], tracks: &[Track]) -> DMatrix<f64> {
     let total: usize = tracks.iter().map(|t| t.states.len()).sum();
     let every = (total / SAMPLES).max(1);
@@ -237,7 +241,7 @@ fn gram(model: &GreyBox, places: &[usize], tracks: &[Track]) -> DMatrix<f64> {
     gram / count.max(1.0)
 }
 
-/// ∂F_p/∂θ of every coefficient, then of Jxz, at a sample.
+/// Derivatives ∂F_p/∂θ of the prior's state rates at sample `k`, with respect to every coefficient, then to Jxz.
 pub(crate) fn columns(model: &GreyBox, track: &Track, k: usize) -> Vec<[f64; 8]> {
     let (state, controls) = (&track.states[k], &track.controls[k]);
     let air = model.air(state, track.altitude[k]);
@@ -268,7 +272,8 @@ pub(crate) fn rate_of(model: &GreyBox, state: &State, air: &AirData, wrench: &Wr
     std::array::from_fn(|i| rate[i] - still[i])
 }
 
-/// T with Tᵀ G T = 1 on the identifiable directions, and the coefficients outside them.
+/// T with Tᵀ G T = 1 on the identifiable directions, and the indices of the coefficients that are mostly outside
+/// these directions.
 fn whiten(gram: &DMatrix<f64>) -> (DMatrix<f64>, Vec<usize>) {
     let n = gram.nrows();
     if n == 0 {

@@ -35,7 +35,7 @@ enum Kind {
 }
 
 impl Kind {
-    /// The kind with the processor's widest vectors; `None` without fused multiply-add.
+    /// The kind for the widest vectors of the processor; `None` without fused multiply-add.
     #[cfg_attr(
         not(any(target_arch = "x86_64", target_arch = "aarch64")),
         expect(unused_variables, reason = "elsewhere no multiply-add is known to be fused")

@@ -1,17 +1,17 @@
 //! Initial coefficients of the prior by equation error, before any rollout.
 //!
-//! F_p is linear in the trained coefficients. Over a short window, the change of the measured state less the integral
-//! of F_p along the measured path therefore gives a linear regression. A gradient through rollouts converges more
-//! slowly. A fast mode (the roll damping) settles within a rollout, and after that only ratios of coefficients are
-//! identifiable. The paper starts from the prior as given.
+//! The prior's state rates F_p are linear in the trained coefficients. Over a short window, the change of the
+//! measured state less the integral of F_p along the measured path therefore gives a linear regression. A gradient
+//! through rollouts converges more slowly: a fast mode (the roll damping) settles within a rollout, and after that
+//! only ratios of coefficients are identifiable. \[GSFM26\] starts from the prior as given.
 //!
-//! A standard deviation in the model's file is the prior of its coefficient. Poorly identifiable coefficients then stay
-//! near their value. Other coefficients are estimated from the flights alone. All stay within their physically possible
-//! ranges.
+//! A standard deviation in the model's file defines the prior distribution of its coefficient. Poorly identifiable
+//! coefficients then stay near their value in the file. Coefficients without a standard deviation are estimated from
+//! the flights alone. All coefficients stay within their physically possible ranges.
 //!
-//! Forces without trained coefficients can have errors over the flow angles, which the residual is to learn. These
-//! errors are fitted as nuisance terms and dropped. Otherwise too small a drag would be compensated by too little
-//! thrust.
+//! A force without trained coefficients can have an error that depends on the flow angles. The residual is to learn
+//! this error. The regression fits it by nuisance terms, which are then dropped. Otherwise, for example, too little
+//! thrust would compensate for too little drag.
 
 use std::ops::{AddAssign, SubAssign};
 
@@ -24,7 +24,8 @@ use greylag_model::{GreyBox, Integrator, STEP};
 use greylag_num::statistics::correlation_length;
 use greylag_physics::{Channel, Controls, State, Wrench};
 
-/// Steps of 10 ms of a window. The noise of the states is divided by this number, and slow effects remain visible.
+/// Number of steps of a window, 10 ms each. The noise of the mean rate over a window is inversely proportional to
+/// this number. Motions that are slower than a window remain visible.
 const STEPS: usize = 5;
 
 /// Largest number of windows used.
@@ -37,7 +38,8 @@ const PASSES: usize = 12;
 /// errors.
 const REACH: f64 = 4.685;
 
-/// Smallest robust standard deviation, as a fraction of a channel's RMS slope: the integration error of the path.
+/// Smallest robust standard deviation of a channel, as a fraction of the RMS of its regressors. It accounts for the
+/// integration error along the measured path.
 const FLOOR: f64 = 1e-3;
 
 /// Rates that depend on forces and moments: airspeed, p, q, r, alpha, beta.
@@ -58,15 +60,16 @@ pub(super) enum Weighting {
     Alike,
 }
 
-/// Regression row of a window or a sample: each channel's error in units of x_c, and the slopes of the prediction.
+/// Regression row of a window or a sample: the error of each channel in units of x_c, and the derivatives of the
+/// prediction.
 pub(super) struct Row {
     pub error: [f64; 6],
-    /// Slopes over the coordinates, then over the nuisance terms.
+    /// Derivatives with respect to the coordinates, then with respect to the nuisance coefficients.
     pub slopes: Vec<[f64; 6]>,
 }
 
 impl Row {
-    /// Updates the error after a step of the fitted parameters.
+    /// Updates the error after the fitted parameters have changed by `step`.
     pub fn advance(&mut self, step: &DVector<f64>) {
         for (slopes, step) in self.slopes.iter().zip(step.iter()) {
             self.error.iter_mut().zip(slopes).for_each(|(error, slope)| *error -= slope * step);
@@ -173,7 +176,7 @@ impl<'a> Fit<'a> {
         row
     }
 
-    /// State rates of each nuisance term of each force.
+    /// State rates due to each nuisance term of each force, per unit of its coefficient.
     pub fn rates_along(&self, model: &GreyBox, state: &State, altitude: f64) -> Vec<[f64; 8]> {
         let air = model.air(state, altitude);
         let State { alpha, beta, .. } = *state;
@@ -203,8 +206,9 @@ fn quadrature(integrator: Integrator, channel: usize, k: usize) -> f64 {
     }
 }
 
-/// The weighted least-squares step of the fitted parameters. `known` is the prior information on the first parameters,
-/// and their deviation from the prior mean. `None` if there are no rows or the normal equations cannot be solved.
+/// The weighted least-squares step of the fitted parameters. `known` holds the prior information on the first
+/// parameters and their deviation from the prior mean. `None` if there are no rows or the normal equations cannot be
+/// solved.
 pub(super) fn solve(
     rows: &[Row],
     count: usize,
@@ -262,7 +266,7 @@ pub(super) fn solve(
 mod tests {
     use super::*;
 
-    /// Flights without a whole window give no rows. The training then reports that it has too little data.
+    /// Flights that are shorter than a window give no rows. The training then reports that it has too little data.
     #[test]
     fn no_rows_have_no_solution() {
         assert!(solve(&[], 2, Weighting::Tukey, None).is_none());

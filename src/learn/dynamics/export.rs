@@ -25,7 +25,7 @@ pub enum ExportError {
     Prior {
         /// Path of the prior's file.
         path: PathBuf,
-        /// What has changed.
+        /// Description of the change or of the missing entry.
         why: String,
     },
 }
@@ -46,8 +46,8 @@ pub struct Text<'a> {
     pub trained: &'a [String],
 }
 
-/// Writes `model`, learned from the prior in the file `prior`, into `folder`. Existing files are replaced, the model
-/// file last.
+/// Writes `model`, which was trained from the prior in the file `prior`, into `folder`. Existing files are replaced,
+/// the model file last.
 ///
 /// # Errors
 ///
@@ -109,7 +109,7 @@ fn fail(doing: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Expo
     move |why| ExportError::File { doing, path, why }
 }
 
-/// Name and content of each effect file of the model file `table` in the folder `beside`. A folder
+/// Name and content of each effect file that the model file `table` names, relative to the folder `beside`. A folder
 /// contributes its `.toml` files, as when the model is read. Files of the same name are renamed.
 fn effect_files(table: &toml::Table, beside: &Path) -> Result<Vec<(String, Vec<u8>)>, ExportError> {
     let mut own: Vec<(String, Vec<u8>)> = Vec::new();
@@ -141,8 +141,8 @@ fn files_of(path: &Path) -> std::io::Result<Vec<PathBuf>> {
     Ok(all)
 }
 
-/// Writes the coefficient `name` of `model` into the model file's `table`. A coefficient whose value comes from an effect
-/// file gets an entry. `None` if the table lacks the effect.
+/// Writes the coefficient `name` of `model` into the model file's `table`. An entry is created if the value came from
+/// an effect file. `None` if the table lacks the effect.
 fn write_trained(
     table: &mut toml::Table,
     model: &GreyBox,

@@ -1,7 +1,8 @@
-//! Functions of a pass, each compiled once per instruction set.
+//! Functions of the forward and the reverse pass, each compiled once for each instruction set.
 //!
-//! The prior is by far the largest part and is called instead of inlined. Its callers are compiled for the same
-//! instructions. Two integration schemes share one copy of its value, its slopes and the slopes over its coefficients.
+//! The prior is by far the largest part of the code and is called instead of inlined. Its callers are compiled for
+//! the same instructions. Both integration schemes share one copy of the prior's value and of its derivatives with
+//! respect to the state and to the coefficients.
 
 use crate::dynamics::packet::Packet;
 use crate::dynamics::prior::{At, PriorOutputs, Slopes};
@@ -16,20 +17,20 @@ use greylag_num::{Avx2, Avx512};
 pub trait InstructionSet: Copy + Send + Sync {
     /// The number type of a pass.
     type Number: Packet;
-    /// Calls [`At::ask`] for the prior.
+    /// Calls [`At::ask`], which evaluates the prior.
     fn ask<const WHOLE: bool>(
         self,
         model: &GreyBox,
         at: &At<Self::Number>,
     ) -> PriorOutputs<Self::Number>;
-    /// Calls [`At::slope`] for the state's slopes.
+    /// Calls [`At::slope`], which computes the gradient with respect to the state.
     fn slope<const WHOLE: bool>(
         self,
         model: &GreyBox,
         at: &At<Self::Number>,
         slopes: &Slopes<Self::Number>,
     ) -> [Self::Number; 8];
-    /// Calls [`At::coefficients`] for the coefficients' slopes.
+    /// Calls [`At::coefficients`], which adds the gradient with respect to the coefficients.
     fn coefficients<const WHOLE: bool>(
         self,
         model: &GreyBox,

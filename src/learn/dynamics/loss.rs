@@ -10,7 +10,7 @@ use crate::dynamics::windows::{Track, Window};
 /// Penalty on the residual.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Penalty {
-    /// The ratio ‖F_a‖/‖F_p‖, eq. (24).
+    /// The ratio ‖F_a‖/‖F_p‖ of the state rates of residual and prior, eq. (24).
     Ratio,
     /// The norm ‖F_a‖, as in PhIHP and APHYNITY.
     Absolute,
@@ -25,7 +25,7 @@ pub struct Objective {
     pub penalty: Penalty,
     /// Divisor of the prediction error: L_prior of eq. (23), or 1.
     pub unit: f64,
-    /// λ of eq. (24).
+    /// λ of eq. (24): the penalty is divided by it.
     pub lambda: f64,
 }
 
@@ -34,9 +34,9 @@ pub struct Objective {
 pub struct Loss {
     /// Prediction loss L_pred, eq. (20).
     pub prediction: f64,
-    /// Norm ‖F_p‖, eq. (22), 1/s.
+    /// Norm ‖F_p‖ of the prior's state rates, eq. (22), 1/s.
     pub prior: f64,
-    /// Norm ‖F_a‖ in 1/s.
+    /// Norm ‖F_a‖ of the residual's state rates, 1/s.
     pub learned: f64,
     /// The whole objective, eq. (24).
     pub objective: f64,
@@ -45,11 +45,11 @@ pub struct Loss {
 }
 
 impl Objective {
-    /// The loss of sums over `points` points, with its slopes over the sums.
+    /// The loss for `sums` over `points` points, with the derivatives of the objective with respect to the sums.
     pub fn of(&self, sums: &Sums, points: f64) -> (Loss, SumSlopes) {
         let prediction = sums.error / points;
         let [prior, learned] = [sums.prior, sums.learned].map(|s| (s / points).sqrt());
-        // the norm is not differentiable at zero; its slope is set to zero
+        // the norm is not differentiable at zero; its derivative is set to zero there
         let per = |norm: f64| if norm > 0.0 { 1.0 / (2.0 * norm * points) } else { 0.0 };
         let weight = 1.0 / self.lambda;
         let (penalty, of_learned, of_prior) = match self.penalty {
@@ -113,7 +113,7 @@ pub struct Minibatch<S: InstructionSet> {
 }
 
 impl<R: Packet, S: InstructionSet<Number = R>> Minibatch<S> {
-    /// Memory for rollouts of up to `steps` steps.
+    /// Memory for up to `windows` rollouts of up to `steps` steps.
     pub fn new(subject: &Subject, windows: usize, steps: usize, set: S) -> Self {
         let gradient = Gradient::zero(subject);
         let work = Work {
@@ -139,7 +139,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Minibatch<S> {
     ///
     /// # Panics
     ///
-    /// If there are more windows than memory for them.
+    /// If there are more windows than the memory was allocated for.
     pub fn step(
         &mut self,
         subject: &Subject,

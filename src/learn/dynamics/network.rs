@@ -5,14 +5,14 @@ use greylag_model::residual::{INPUTS, OUTPUTS};
 use greylag_num::dense::{Layer, rectify};
 use greylag_num::{Dense, Real};
 
-/// Side of a square tile of a weight matrix. The gradient of a tile is summed in registers.
+/// Number of rows and columns of a tile of a weight matrix. The gradient of a tile is summed in registers.
 const TILE: usize = 4;
 
 /// A network prepared for both passes.
 #[derive(Clone, Debug)]
 pub struct Passes {
     network: Dense,
-    /// For each layer: the weights as `[out, in]`, and a zero bias for each input.
+    /// For each layer, the transposed weights `[out, in]` for the backward pass, and a zero bias for each input.
     transposed: Vec<(Vec<f32>, Vec<f32>)>,
 }
 

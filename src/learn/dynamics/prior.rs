@@ -1,4 +1,4 @@
-//! The prior at a point: its rates, and their slopes over state and coefficients.
+//! The prior at a point: state rates, and their derivatives with respect to state and coefficients.
 
 use crate::dynamics::packet::Packet;
 use greylag_model::{GreyBox, Starting, Weights, parted};
@@ -7,7 +7,8 @@ use greylag_physics::effects::{Needs, Terms};
 use greylag_physics::rigid_body::{self, Vector};
 use greylag_physics::{AirData, Channel, Controls, State, Wrench};
 
-/// Altitude for the airflow, m: infinite, without ground effect. The air density is a separate input.
+/// Altitude for the airflow, m. It is infinite, so that there is no ground effect. The air density is a separate
+/// input.
 pub const ALOFT: f64 = f64::INFINITY;
 
 /// Outputs of the prior at a point.
@@ -17,18 +18,18 @@ pub struct PriorOutputs<R> {
     pub acceleration: Vector<R>,
     /// Angular acceleration in rad/s².
     pub spin: Vector<R>,
-    /// F_p, the rates of the state.
+    /// State rates F_p of the prior.
     pub rate: State<R>,
 }
 
-/// Slopes of the loss over the outputs [`PriorOutputs`].
+/// Gradient of the loss with respect to the outputs [`PriorOutputs`].
 #[derive(Clone, Copy, Debug)]
 pub struct Slopes<R> {
-    /// Slope over the specific force plus gravity.
+    /// Gradient with respect to the specific force plus gravity.
     pub acceleration: Vector<R>,
-    /// Slope over the angular acceleration.
+    /// Gradient with respect to the angular acceleration.
     pub spin: Vector<R>,
-    /// Slope over the state's rates.
+    /// Gradient with respect to the state rates.
     pub rate: State<R>,
 }
 
@@ -50,8 +51,8 @@ impl<R: Real> At<R> {
         AirData::new(&self.state, self.density, ALOFT, &model.airframe.geometry)
     }
 
-    /// Outputs of the prior of `model`. With `WHOLE` all effects are included. Otherwise only effects that depend on
-    /// the point alone are included, in code without the others.
+    /// Outputs of the prior of `model`. With `WHOLE`, all effects are evaluated. Without it, only the effects that
+    /// need nothing but the point are evaluated, and the code of the others is not compiled in.
     #[inline(always)]
     pub fn ask<const WHOLE: bool>(&self, model: &GreyBox) -> PriorOutputs<R> {
         let air = self.air(model);
@@ -64,14 +65,14 @@ impl<R: Real> At<R> {
         PriorOutputs { acceleration, spin, rate }
     }
 
-    /// The slopes of the loss over the state.
+    /// Gradient of the loss with respect to the state, from the gradient `slopes` with respect to the outputs.
     #[inline(always)]
     pub fn slope<const WHOLE: bool>(&self, model: &GreyBox, slopes: &Slopes<R>) -> [R; 8] {
         transposed(&self.state.to_array(), &Asked::<R, WHOLE> { model, at: self, slopes })
     }
 }
 
-/// The prior as a function of the state, with the slopes over its outputs.
+/// The prior as a function of the state, with the gradient of the loss with respect to its outputs.
 struct Asked<'a, R, const WHOLE: bool> {
     model: &'a GreyBox,
     at: &'a At<R>,
@@ -97,12 +98,12 @@ impl<R: Real, const WHOLE: bool> Sloped<R, 8> for Asked<'_, R, WHOLE> {
     }
 }
 
-/// A function of `N` inputs, with slopes over its outputs.
+/// A function of `N` inputs, with the gradient of the loss with respect to its outputs.
 ///
-/// This is a trait instead of a closure because its method can be forced to inline. A call would end the vector
-/// instructions.
+/// This is a trait instead of a closure because its method can be forced to inline. A function call would leave the
+/// code that is compiled for vector instructions.
 pub trait Sloped<R: Real, const N: usize> {
-    /// Σ over outputs of slope times derivative, in the two directions that the inputs mark.
+    /// Derivatives of the loss in two directions. The gradients of `inputs` define the directions.
     fn part(&self, inputs: [Dual<2, R>; N]) -> [R; 2];
 }
 
@@ -112,10 +113,10 @@ pub fn fixed<R: Real>(x: R) -> Dual<2, R> {
     Dual { value: x, gradient: [R::zero(); 2] }
 }
 
-/// Σ of slopes times derivatives with respect to each of `inputs`, two at a time.
+/// Gradient of the loss with respect to `inputs`.
 ///
 /// The derivatives are computed two at a time because the compiler inlines the whole prior for each direction. The
-/// network costs far more.
+/// evaluation of the network takes far more time.
 #[inline(always)]
 pub fn transposed<R: Real, const N: usize>(
     inputs: &[R; N],
@@ -143,7 +144,7 @@ pub fn transposed<R: Real, const N: usize>(
     sums
 }
 
-/// Adds the derivatives of an output times its slope.
+/// Adds the derivatives of the output `out` times `slope`, the derivative of the loss with respect to this output.
 #[inline(always)]
 pub fn add<R: Real>(sum: &mut [R; 2], out: &Dual<2, R>, slope: R) {
     for (sum, g) in sum.iter_mut().zip(out.gradient) {
@@ -152,10 +153,11 @@ pub fn add<R: Real>(sum: &mut [R; 2], out: &Dual<2, R>, slope: R) {
 }
 
 impl<R: Packet> At<R> {
-    /// Adds the slopes over the coefficients to `sums`, and the slope over Jxz to the last entry.
+    /// Adds the gradient of the loss with respect to the coefficients to `sums`, and the derivative with respect to
+    /// Jxz to the last entry.
     ///
-    /// The slopes are exact for effects that are linear in their coefficients. Without `WHOLE` all effects must depend
-    /// on the point alone.
+    /// The gradient is exact for effects that are linear in their coefficients. Without `WHOLE`, all effects must
+    /// need nothing but the point.
     #[inline(always)]
     pub fn coefficients<const WHOLE: bool>(
         &self,
@@ -193,11 +195,12 @@ impl<R: Packet> At<R> {
 }
 
 impl<R: Packet> At<R> {
-    /// Adds the slopes over the coefficients of all effects, from the slopes `wrench` over forces and moments. Returns
-    /// the moments.
+    /// Adds the gradient with respect to the coefficients of all effects, from the gradient `wrench` with respect to
+    /// forces and moments. Returns the moments.
     ///
-    /// Dependent effects use three sums over the independent effects: as they are, with centred surfaces, and at rest.
-    /// The slopes over these sums propagate to the coefficients of the independent effects.
+    /// Dependent effects use three sums over the independent effects: at the point, with neutral surfaces, and with
+    /// neutral surfaces and zero body rates. The gradient with respect to these sums is propagated to the
+    /// coefficients of the independent effects.
     #[inline(always)]
     fn whole(
         &self,
@@ -208,7 +211,7 @@ impl<R: Packet> At<R> {
     ) -> Vector<R> {
         let made = model.independent_sums(&self.state, &self.controls, air);
         let mut back = [Wrench::zero(); 3];
-        // the channels of the sums, then the coefficients of the dependent effects, two at a time
+        // directions: the channels of the sums, then the coefficients of the dependent effects, two at a time
         let mut own = model.dependent_coefficients();
         let (mut first, mut more) = (0, true);
         while more {
@@ -243,7 +246,8 @@ impl<R: Packet> At<R> {
         [Channel::Roll, Channel::Pitch, Channel::Yaw].map(|c| made.get(c))
     }
 
-    /// Σ of the slopes `wrench` times the derivatives of the forces and moments of all effects, in two directions.
+    /// Derivatives of the loss in two directions `moves`, from its gradient `wrench` with respect to the forces and
+    /// moments of all effects.
     #[inline(always)]
     fn moved(
         &self,
@@ -275,17 +279,17 @@ impl<R: Packet> At<R> {
     }
 }
 
-/// Channels of the three sums of [`GreyBox::independent_sums`].
+/// Number of channels of the three sums of [`GreyBox::independent_sums`].
 const CHANNELS_OF_SUMS: usize = 21;
 
-/// Perturbation in each of two directions: a channel of the three sums, numbered consecutively, or the coefficient at
-/// an index.
+/// Two directions of differentiation. A direction is a channel of the three sums, numbered consecutively, or the
+/// coefficient at an index.
 struct Moves {
     channels: [Option<usize>; 2],
     places: [Option<usize>; 2],
 }
 
-/// Coefficients of which two are perturbed, one in each direction.
+/// Coefficients of the model, of which up to two are directions of differentiation.
 #[derive(Clone, Copy)]
 struct Marked<'a> {
     model: &'a GreyBox,
@@ -305,7 +309,7 @@ impl<R: Real> Weights<Dual<2, R>> for Marked<'_> {
     }
 }
 
-/// Collects the terms of a prior's effects: slopes over coefficients, and the moments.
+/// Collects the terms of a prior's effects: the gradient with respect to the coefficients, and the moments.
 struct Tally<'a, R> {
     model: &'a GreyBox,
     first: usize,

@@ -1,10 +1,10 @@
 //! Joint training by variable projection (Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973).
 //!
-//! Prior and residual are learned together, and the prior is linear in its coefficients. For a given residual, the best
-//! coefficients leave no part of the residual in the span of ∂F_p/∂θ. They follow from a linear regression of the
-//! residual on these slopes, over the samples of the flights. The gradient of the rollouts approaches the same
-//! condition in the mean square. In the mean square, a stall outside the prior's structure dominates the residual and
-//! biases the coefficients. Tukey's weights exclude the stall.
+//! Prior and residual are learned together, and the prior's state rates F_p are linear in its coefficients θ. For a
+//! given residual, the best coefficients leave no part of the residual in the span of ∂F_p/∂θ. They follow from a
+//! linear regression of the residual on these derivatives, over the samples of the flights. The gradient of the
+//! rollouts approaches the same condition in the mean square. In the mean square, a stall outside the prior's
+//! structure dominates the residual and biases the coefficients. Tukey's weights exclude the stall.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -20,8 +20,8 @@ const SAMPLES: usize = 8192;
 /// Number of reweighting iterations.
 const PASSES: usize = 8;
 
-/// Step of the coordinates of `basis` that moves the part of `residual` in the span of `prior` into `prior`. `None` if
-/// the regression has no finite solution.
+/// Step of the coordinates of `basis` that moves the part of `residual` in the span of ∂F_p/∂θ into the coefficients
+/// of `prior`. `None` if the regression has no finite solution.
 pub(super) fn step(
     prior: &GreyBox,
     residual: &Residual,
@@ -50,7 +50,7 @@ pub(super) fn step(
 }
 
 impl Fit<'_> {
-    /// The residual at a sample, and the slopes of the prior there.
+    /// Regression row of sample `k`: the residual's state rates, and the derivatives of the prior's state rates.
     fn sample(&self, prior: &GreyBox, residual: &Residual, track: &Track, k: usize) -> Row {
         let (state, controls) = (&track.states[k], &track.controls[k]);
         let scale = prior.scale();

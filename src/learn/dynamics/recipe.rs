@@ -5,13 +5,14 @@ use serde::{Deserialize, Serialize};
 use crate::dynamics::loss::Penalty;
 use greylag_model::GreyBox;
 
-/// Variant of the training objective, by its publication.
+/// Variants of the training objective from different publications.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Criterion {
-    /// \[GSFM26\]: scaled by x_c, divided by the bare prior's error, with a penalty on ‖F_a‖/‖F_p‖.
+    /// \[GSFM26\]: errors are scaled by x_c and divided by the error of the bare prior. The penalty is on
+    /// ‖F_a‖/‖F_p‖.
     Scaled,
-    /// APHYNITY and PhIHP: x_c = 1, no divisor, penalty on ‖F_a‖. PhIHP freezes the prior.
+    /// APHYNITY and PhIHP: x_c = 1, no divisor, and the penalty is on ‖F_a‖. PhIHP freezes the prior.
     Plain,
 }
 
@@ -50,9 +51,10 @@ pub enum Joint {
     /// By the gradient of the rollouts, at the learning rate [`Recipe::prior_rate`], as in the paper.
     #[default]
     Gradient,
-    /// By robust variable projection: the part of the residual in the prior's span moves into its coefficients.
+    /// By robust variable projection: the part of the residual in the span of the prior moves into the prior's
+    /// coefficients.
     Projection,
-    /// By least-squares variable projection: the limit of the gradient.
+    /// By least-squares variable projection, to which training by the gradient converges.
     LeastSquares,
 }
 
@@ -62,13 +64,14 @@ impl Joint {
     }
 }
 
-/// All settings that determine the result, other than data and prior.
+/// All settings that determine the result, except data and prior.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
-    /// Units of the hidden layers of the residual.
+    /// Number of units of each hidden layer of the residual.
     pub hidden: Vec<usize>,
-    /// Rollout lengths n, steps of 10 ms. Each length has an equal share of the updates, in this order.
+    /// Rollout lengths n, in steps of 10 ms. The lengths are used in this order, each for an equal part of the
+    /// updates.
     pub steps: Vec<usize>,
     /// Number of rollouts in a minibatch.
     pub batch: usize,
@@ -86,15 +89,15 @@ pub struct Recipe {
     /// Method of training the prior's coefficients.
     #[serde(default, skip_serializing_if = "Joint::is_gradient")]
     pub joint: Joint,
-    /// λ0 of eq. (24).
+    /// Initial value λ0 of λ in eq. (24).
     pub lambda: f64,
     /// τ of eq. (24). λ grows by τ times the relative prediction loss in each update.
     pub tau: f64,
     /// Variant of the training objective.
     pub criterion: Criterion,
-    /// Weights each rollout by 1/(e² + floor²). e is the prior's error at the end of the rollout, relative to the RMS
-    /// over the rollouts. The residual is then equally accurate where the prior has small errors and where it has large
-    /// errors (stall). `None` weights all rollouts equally, as in the paper.
+    /// Weights each rollout by 1/(e² + floor²). Here e is the prior's error at the end of the rollout, relative to
+    /// the RMS over the rollouts. The residual then has the same relative accuracy where the prior's errors are small
+    /// and where they are large (stall). `None` weights all rollouts equally, as in the paper.
     pub floor: Option<f64>,
     /// Full names of the trained coefficients of the prior; empty for a frozen prior.
     pub trainable: Vec<String>,

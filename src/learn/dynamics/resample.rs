@@ -1,8 +1,8 @@
 //! Resamples a flight with a longer sample time to the model's step.
 //!
 //! States are interpolated by cubics through four samples (Catmull–Rom), controls linearly. A reconstructed path is
-//! smooth. At 25 Hz a cubic has an error of a few parts in a thousand. At 10 Hz the fastest motions of a small aircraft
-//! lie between the samples.
+//! smooth. At 25 Hz, a cubic has an error of a few parts in a thousand. At 10 Hz, the fastest motions of a small
+//! aircraft cannot be reconstructed between the samples.
 
 use greylag_model::STEP;
 use greylag_physics::{Controls, State};
@@ -13,8 +13,8 @@ pub const SLOWEST_S: f64 = 0.1;
 /// A sample: state, controls, altitude in m.
 pub type Row = (State, Controls, f64);
 
-/// `rows` with sample time `step_s` resampled to [`STEP`], starting from the first. Roll angles may wrap between
-/// rows.
+/// `rows` with sample time `step_s` (s) resampled to [`STEP`], starting from the first row. Roll angles may wrap
+/// between rows.
 pub fn resampled(rows: &[Row], step_s: f64) -> Vec<Row> {
     if rows.len() < 2 {
         return rows.to_vec();
@@ -42,8 +42,8 @@ fn at(rows: &[Row], place: f64) -> Row {
     (State::from_array(state), controls, altitude)
 }
 
-/// The cubic through the two middle values, at the fraction `x` of the way between them. Its slopes there are central
-/// differences.
+/// The cubic through the two middle values, at the fraction `x` of the way between them. Its derivatives at these
+/// values are central differences.
 fn cubic([a, b, c, d]: [f64; 4], x: f64) -> f64 {
     let (first, last) = (0.5 * (c - a), 0.5 * (d - b));
     let bend = c - b;

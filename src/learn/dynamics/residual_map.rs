@@ -1,4 +1,5 @@
-//! Map of the learned residual: channels, regimes and magnitudes.
+//! Map of the learned residual: channels, regimes and magnitudes. F_a are the state rates of the residual, F_p those
+//! of the prior, and x_c is the reference scale of the state.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -13,7 +14,7 @@ pub const CHANNELS: [&str; 8] = ["roll", "pitch", "airspeed", "p", "q", "r", "al
 /// Number of bins of a regime variable.
 const BINS: usize = 10;
 
-/// Smallest number of samples of a bin that is shown.
+/// Smallest number of samples in a bin. Bins with fewer samples are omitted.
 const SUPPORT: usize = 20;
 
 /// Statistics of a residual over recorded flights.
@@ -38,8 +39,8 @@ pub struct Share {
     pub prior: f64,
     /// Root mean square of F_a/x_c, 1/s.
     pub learned: f64,
-    /// Regime variable of the bin with the strongest residual, and the bin's edges (degrees, m/s). `None` without a
-    /// bin.
+    /// Regime variable and edges (degrees, m/s) of the bin with the largest residual relative to the other bins of
+    /// this variable. `None` if no bin has enough samples.
     pub strongest: Option<(&'static str, [f64; 2])>,
 }
 
@@ -122,7 +123,7 @@ pub fn residual_map(model: &GreyBox, tracks: &[Track]) -> Option<ResidualMap> {
     })
 }
 
-/// The bin of `x` between the edges of a regime variable.
+/// The bin of `x` between the edges of a regime variable; `None` outside the edges.
 fn bin(x: f64, [low, high]: [f64; 2]) -> Option<usize> {
     let place = (x - low) / (high - low) * BINS as f64;
     (place >= 0.0 && place < BINS as f64).then_some(place as usize)

@@ -5,10 +5,10 @@ use rayon::prelude::*;
 use crate::dynamics::windows::{Track, Window, windows};
 use greylag_model::{GreyBox, Memory};
 
-/// Interval between starts, steps.
+/// Interval between the starts of two runs, steps.
 const EVERY: usize = 50;
 
-/// Scaled error at which a run counts as diverged, and to which it is clamped.
+/// Largest scaled error of a run. A run with this error counts as diverged.
 const BOUND: f64 = 1.0;
 
 /// The error at one horizon.
@@ -16,9 +16,10 @@ const BOUND: f64 = 1.0;
 pub struct Horizon {
     /// Horizon in steps.
     pub steps: usize,
-    /// Number of runs of this length.
+    /// Number of runs that reach this horizon.
     pub runs: usize,
-    /// RMS error over the runs. The error of a run is the RMS over the states of (ŝ − s)/x_c, limited to 1.
+    /// RMS error over the runs. The error of a run is the RMS over the states of (ŝ − s)/x_c, limited to 1. Here ŝ is
+    /// the predicted and s the recorded state.
     pub rms: f64,
     /// Median error over the runs.
     pub median: f64,
@@ -49,15 +50,15 @@ fn horizon(model: &GreyBox, tracks: &[Track], steps: usize) -> Horizon {
     }
 }
 
-/// The error of one run after `steps` steps from `window` on: the root mean square over the states of
-/// (ŝ − s)/x_c, 1 at most.
+/// The error of one run after `steps` steps from `window` on: the root mean square over the states of (ŝ − s)/x_c,
+/// limited to 1.
 pub(crate) fn off_after(model: &GreyBox, tracks: &[Track], window: &Window, steps: usize) -> f64 {
     let (track, start) = (&tracks[window.track as usize], window.start as usize);
     let mut memory = Memory::default();
     let advance = |k: usize, state, memory: &mut Memory| {
         model.step(&state, &track.controls[k], track.altitude[k], memory)
     };
-    // the integrator's memory of the step before
+    // the integrator needs the memory of the step before the start
     advance(start - 1, track.states[start - 1], &mut memory);
     let mut state = track.states[start];
     for k in start..start + steps {

@@ -24,7 +24,7 @@ use greylag_model::{GreyBox, Residual};
 use greylag_num::{Dense, stream};
 use stage::Stage;
 
-/// Largest number of samples for the envelope of the data.
+/// Largest number of samples from which the envelope of the training data is computed.
 const ENVELOPE_SAMPLES: usize = 40_000;
 
 /// Consecutive failed updates after which the training ends with [`TrainError::Diverged`].
@@ -35,7 +35,7 @@ const PROJECT_EVERY: u64 = 500;
 /// Fraction of the updates after which projections end. The residual then adapts to the final coefficients.
 const PROJECT_UNTIL: f64 = 0.75;
 
-/// Ids of the random streams.
+/// Id of the random stream for the initial weights of the network.
 const START: u64 = 1;
 
 /// A training in progress.
@@ -76,7 +76,7 @@ impl Trainer {
         let sizes: Vec<usize> =
             [INPUTS].into_iter().chain(recipe.hidden.iter().copied()).chain([OUTPUTS]).collect();
         let network = Dense::silent(&sizes, &mut stream::stream(recipe.seed, &[START]))?;
-        // layers that no residual may have must be rejected here, not when the trained model is made
+        // layer sizes that are invalid for a residual must be rejected here, not when the trained model is created
         Residual::new(network.clone(), &prior.airframe, prior.scale())?;
         let mut subject = Subject {
             scales: Scales::new(&prior.airframe, prior.scale()),
@@ -92,8 +92,9 @@ impl Trainer {
         let arithmetic = Arithmetic::Lanes;
         let engine = Engine::new(&subject, recipe.batch, longest, arithmetic);
         let count = subject.network.network().parameters().len();
-        // The residual learns the error of this prior, which may be much smaller than that of the prior as given. With
-        // the error of the latter as divisor, the whole prediction loss would be smaller than the penalty.
+        // The residual learns the error of the prior with these initial coefficients. This error may be much smaller
+        // than that of the prior as given. If the larger error were the divisor, the whole prediction loss would be
+        // smaller than the penalty.
         basis.apply(&mut subject.prior, &coordinates);
         let begun = subject.prior.clone();
         let stage = Stage::new(&subject, &recipe, &tracks, recipe.steps_at(0))?;
@@ -153,7 +154,7 @@ impl Trainer {
             self.prior.axes
         );
         let airframe = fingerprint(&self.prior.airframe);
-        // a prior without tables and effect files keeps its former identity
+        // the identity of a prior without tables and effect files is the same as in earlier versions of the program
         let tables: String =
             self.prior.tables().map(|(id, table)| format!(" {id} {table:?}")).collect();
         let grid = self.prior.thrust_grid().map(|grid| format!(" {grid:?}")).unwrap_or_default();
@@ -182,7 +183,7 @@ impl Trainer {
         &self.recipe
     }
 
-    /// Coefficients that the data does not identify: they stay constant.
+    /// Names of the coefficients that the data does not identify. They stay constant.
     pub fn unseen(&self) -> &[String] {
         &self.basis.unseen
     }
@@ -270,7 +271,7 @@ impl Trainer {
         })
     }
 
-    /// Moves the part of the residual in the prior's span into the prior's coefficients, if a projection is due.
+    /// If a projection is due, moves the part of the residual in the span of the prior into the prior's coefficients.
     fn project(&mut self) -> Result<(), TrainError> {
         let weighting = match self.recipe.joint {
             Joint::Gradient => return Ok(()),
@@ -293,7 +294,8 @@ impl Trainer {
         Ok(())
     }
 
-    /// One update. `None` if the gradient is not finite or more than half of the rollouts are lost.
+    /// Makes one update. Returns the loss and the relative prediction loss L_pred/L_prior; `None` if the gradient is
+    /// not finite or more than half of the rollouts are lost.
     fn one(&mut self) -> Result<Option<(Loss, f64)>, TrainError> {
         let steps = self.recipe.steps_at(self.update);
         if steps != self.stage.steps {

@@ -9,12 +9,12 @@ use greylag_model::GreyBox;
 use greylag_physics::inputs::InputMemory;
 use greylag_physics::{Controls, State};
 
-/// A section of flight without gaps, a sample every 0.01 s.
+/// A section of flight without gaps, with a sample every 0.01 s.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Track {
     /// States at each sample.
     pub states: Vec<State>,
-    /// The effective controls from each sample to the next.
+    /// Deflections and throttle that act from each sample to the next, after the model's input effects.
     pub controls: Vec<Controls>,
     /// Altitude at each sample, m.
     pub altitude: Vec<f64>,
@@ -23,8 +23,8 @@ pub struct Track {
 }
 
 impl Track {
-    /// A track of `samples` (state, measured controls, altitude in m). The effective controls and the air density
-    /// follow from `model`.
+    /// A track of `samples` (state, measured controls, altitude in m). The acting controls and the air density follow
+    /// from `model`.
     pub fn new(model: &GreyBox, samples: impl Iterator<Item = (State, Controls, f64)>) -> Track {
         let mut track = Track::default();
         let mut memory: Option<InputMemory> = None;
@@ -78,11 +78,12 @@ pub struct Window {
     pub track: u32,
     /// Index of the start sample in the track, at least 1.
     pub start: u32,
-    /// Weight in the loss; 1 in the paper.
+    /// Weight in the loss; 1 in \[GSFM26\].
     pub weight: f64,
 }
 
-/// Magnitude of pitch below which samples are used for training, rad. Euler angles are singular near the vertical.
+/// Samples are used for training only if the magnitude of pitch is below this, rad. Euler angles are singular near
+/// the vertical.
 const STEEPEST: f64 = 1.4;
 /// Airspeed below which flow angles are undefined, m/s.
 const SLOWEST: f64 = 5.0;
@@ -92,7 +93,7 @@ pub(crate) fn regular(state: &State) -> bool {
     state.is_finite() && state.pitch.abs() < STEEPEST && state.airspeed > SLOWEST
 }
 
-/// Every window of `steps` steps, in order, in which all samples are regular (not near the vertical, fast enough).
+/// All windows of `steps` steps, in order, in which every sample is regular (not near the vertical, fast enough).
 pub fn windows(tracks: &[Track], steps: usize) -> Vec<Window> {
     let mut all = Vec::new();
     for (track, t) in tracks.iter().enumerate() {
@@ -125,7 +126,7 @@ pub fn hash(tracks: &[Track]) -> String {
         for k in 0..track.states.len() {
             let Controls { aileron, elevator, throttle, rudder, .. } = track.controls[k];
             let rest = [aileron, elevator, throttle, track.altitude[k]];
-            // tracks without a rudder keep their former hash
+            // the hash of tracks without a rudder is the same as in earlier versions of the program
             let rudder = Some(&rudder).filter(|x| **x != 0.0);
             for x in track.states[k].to_array().iter().chain(&rest).chain(rudder) {
                 hash.update(x.to_le_bytes());

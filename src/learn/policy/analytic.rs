@@ -1,10 +1,10 @@
 //! The analytic policy gradient: the gradient of the reward through the model, over short windows.
 //!
 //! This is the short-horizon actor-critic of Xu et al. (2022) without its critic. The windows are longer than the
-//! aircraft's response, and rewards after them matter little. The model's derivatives are finite differences between
-//! the lanes of one block. The first lane has the point itself, and each other lane has one perturbed variable. The
-//! actuator states are reconstructed from the five observed values and the last commands. The reconstruction is exact
-//! except for the first step off a stop.
+//! response time of the aircraft, so the rewards after a window matter little. The model's derivatives are finite
+//! differences between the lanes of one block. The first lane holds the point itself, and each other lane has one
+//! perturbed variable. The actuator states are reconstructed from the five observed values and the last commands. The
+//! reconstruction is exact except for the first step after an actuator leaves a stop.
 
 mod slopes;
 
@@ -24,27 +24,29 @@ use slopes::{Aircraft, Flyer, INPUTS, NUMBERS, Step, observation_slopes};
 /// Settings of the training.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AnalyticRecipe {
-    /// Units of the actor's hidden layers.
+    /// Number of units of each hidden layer of the actor.
     pub actor: Vec<usize>,
     /// Number of simulated aircraft.
     pub instances: usize,
-    /// Steps per window.
+    /// Number of steps of a window.
     pub window: usize,
-    /// Steps per episode.
+    /// Number of steps of an episode.
     pub episode: usize,
     /// Total number of updates.
     pub updates: u64,
     /// Initial learning rate. A cosine schedule reduces it to a hundredth.
     pub rate: f64,
-    /// Error of roll and pitch (rad) and of airspeed (m/s) below which the reward is smoothed. The reward is not
-    /// differentiable at zero error.
+    /// The reward is smoothed if the error of roll or pitch (rad) or of airspeed (m/s) is below this. The reward as
+    /// given is not differentiable at zero error.
     pub rounding: f64,
-    /// Weight (≥ 0) of the squared change of the command per step, in units of the action, in the objective.
+    /// Weight (≥ 0) of the squared change of the aileron and elevator commands per step in the objective. Commands
+    /// range from −1 to 1.
     pub effort: f64,
-    /// Fraction of the targets in the hard corners, 0..1.
+    /// Fraction of the targets in the corners of the target range (bank of 45° to 60° with pitch of 25° to 30°),
+    /// 0..1.
     pub corners: f64,
-    /// Number of models drawn from the standard deviations of the coefficients, over which the aircraft are distributed
-    /// (domain randomisation). 0 means the model itself.
+    /// Number of models whose coefficients are drawn from their standard deviations (domain randomisation). The
+    /// aircraft are distributed over these models. 0 means that all aircraft use the model itself.
     #[serde(default, skip_serializing_if = "is_none")]
     pub draws: u64,
     /// Seed of all random numbers.
@@ -73,7 +75,7 @@ impl Default for AnalyticRecipe {
     }
 }
 
-/// A simulated aircraft with its target, in an episode.
+/// A simulated aircraft in an episode, with its target and the number of steps left.
 #[derive(Clone, Debug)]
 struct Instance {
     aircraft: Aircraft,
@@ -86,16 +88,16 @@ struct Instance {
 pub struct AnalyticProgress {
     /// Number of updates made.
     pub update: u64,
-    /// Mean reward per step.
+    /// Mean reward per step in the window of this update.
     pub reward: f64,
-    /// Number of aircraft lost so far.
+    /// Number of episodes so far in which the aircraft left the validity limits.
     pub lost: u64,
 }
 
 /// State of a training.
 pub struct AnalyticTrainer {
     recipe: AnalyticRecipe,
-    /// The models, which the aircraft use in turn.
+    /// The models. The aircraft are assigned to them in turn.
     models: Vec<GreyBox>,
     device: Device,
     actor: Mlp,
@@ -134,7 +136,7 @@ impl AnalyticTrainer {
             Stratified::new(recipe.seed, 0, recipe.corners).at_airspeeds_of(&model.airframe);
         let instances = (0..recipe.instances)
             .map(|k| {
-                // Episode ends are spread over time. Otherwise one window would hold all starts.
+                // The ends of the episodes are spread over time. Otherwise one window would contain all starts.
                 let left = recipe.episode * (k + 1) / recipe.instances;
                 Instance { aircraft: neutral, target: targets.next_target(), left }
             })
@@ -157,11 +159,11 @@ impl AnalyticTrainer {
         })
     }
 
-    /// A training from the weights of `actor`, whose layers must be those of the recipe.
+    /// This training with the weights of `actor`, whose layers must be those of the recipe.
     ///
     /// # Errors
     ///
-    /// If the layers differ.
+    /// If the layers differ from those of the recipe.
     pub fn starting_from(mut self, actor: &Actor) -> Result<Self, DenseError> {
         let sizes = actor.network().sizes();
         if sizes != self.actor.sizes() {
@@ -210,7 +212,7 @@ impl AnalyticTrainer {
                 .with_min_len(8)
                 .map_init(|| Units::new(0.0), fly)
                 .collect_into_vec(&mut flown);
-            // targets and sums keep the order of a single core
+            // one thread draws the targets and sums the rewards: the result does not depend on the number of cores
             for (k, (observed, (next, step, earned))) in flown.drain(..).enumerate() {
                 seen[t * count + k] = observed;
                 reward += earned / (count * window) as f64;
@@ -223,7 +225,7 @@ impl AnalyticTrainer {
         Ok(AnalyticProgress { update: self.update, reward, lost: self.lost })
     }
 
-    /// Advances an aircraft to its next step. Returns `false` if its episode ended there.
+    /// Advances aircraft `k` to its state `next`. Returns `false` if its episode ended there.
     fn advance(&mut self, k: usize, next: Aircraft) -> bool {
         let State { pitch, airspeed, alpha, beta, p, q, r, .. } = next.state;
         let inside = pitch.abs() < 1.4
@@ -243,7 +245,7 @@ impl AnalyticTrainer {
         false
     }
 
-    /// Backward pass: the slope of the sum of rewards over every action.
+    /// Backward pass: the derivative of the sum of rewards with respect to every action.
     fn reverse(&self, seen: &[[f32; OBSERVATIONS]], steps: &[Option<Step>]) -> Vec<f32> {
         let count = self.instances.len();
         let actor = self.actor.passed();
@@ -255,7 +257,7 @@ impl AnalyticTrainer {
             let mut of_action = vec![0.0_f32; count * ACTIONS];
             let mut before = vec![[0.0_f32; NUMBERS]; count];
             for (k, step) in steps[range.clone()].iter().enumerate() {
-                // the steps after the end of an episode belong to another episode
+                // an episode ended here: the later steps belong to another episode
                 let Some(step) = step else { continue };
                 let mut sum = [0.0_f32; INPUTS];
                 for ((row, behind), reward) in step.next.iter().zip(behind[k]).zip(step.reward) {
@@ -265,7 +267,7 @@ impl AnalyticTrainer {
                 of_action[k * ACTIONS..][..ACTIONS].copy_from_slice(&sum[NUMBERS..]);
             }
             slopes[t * count * ACTIONS..][..count * ACTIONS].copy_from_slice(&of_action);
-            // through the actor: its action depends on the observation
+            // gradient through the actor: its action depends on the observation
             let rows =
                 self.rows(seen[range].as_flattened(), OBSERVATIONS).autodiff().require_grad();
             let weights = self.rows(&of_action, ACTIONS).autodiff();
@@ -284,7 +286,7 @@ impl AnalyticTrainer {
         slopes
     }
 
-    /// Gradient ascent on the actor.
+    /// Updates the actor by gradient ascent on the reward.
     fn climb(&mut self, seen: &[[f32; OBSERVATIONS]], slopes: &[f32]) {
         let followed = self.actor.followed();
         let rows = self.rows(seen.as_flattened(), OBSERVATIONS).autodiff();

@@ -59,7 +59,7 @@ impl PolicyStanding {
     }
 }
 
-/// Arrays of a state, each with its name.
+/// Arrays of the training state `standing`, each with its name in the file.
 fn lists(standing: &PolicyStanding) -> Vec<(String, &[f32])> {
     let mut lists = vec![("replay".to_owned(), &standing.replay[..])];
     for (name, (own, target, moments)) in NAMES.iter().zip(&standing.td3.networks) {

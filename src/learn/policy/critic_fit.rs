@@ -1,9 +1,10 @@
 //! Twin critics of a fixed actor, learned from the returns of its simulated flights.
 //!
-//! The critics serve a search, which evaluates states off the actor's path. Therefore each flight starts with random
-//! actions for some steps. Then the actor flies. The value of a state on its path is the return of the rewards from
-//! there, with the critic's value of the last state: TD(1) over a window, eq. (11) of \[GSFM26\] for a fixed actor. The
-//! loss is relative to the return. Near the target, returns are small and a search must resolve small differences.
+//! A search uses the critics and evaluates states that the actor would not reach. Therefore each flight starts with
+//! random actions for some steps. Then the actor flies. The value of a state on the flight path is the return of the
+//! rewards from there to the end of the window, plus the critic's discounted value of the last state: TD(1) over a
+//! window, eq. (11) of \[GSFM26\] for a fixed actor. The loss is relative to the return, because returns are small
+//! near the target and a search must resolve small differences there.
 
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::RngExt as _;
@@ -26,21 +27,21 @@ const UPDATE: u64 = 42;
 
 /// Inputs of a critic.
 const INPUTS: usize = OBSERVATIONS + ACTIONS;
-/// Numbers stored per step: a critic's inputs, the return over the rest of the window, the discount of the value at the
-/// end of the window, and a critic's inputs at that end.
+/// Number of values stored per step: a critic's inputs, the return over the rest of the window, the discount of the
+/// value at the end of the window, and a critic's inputs at that end.
 const ROW: usize = INPUTS + 2 + INPUTS;
 
-/// Return, in units of the reward of eq. (30), below which errors count as absolute instead of relative.
+/// Return well below which errors count as absolute instead of relative, in units of the reward of eq. (30).
 const SMALL: f32 = 0.1;
 
 /// Settings of the training of critics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ValuationRecipe {
-    /// Units of a critic's hidden layers.
+    /// Number of units of each hidden layer of a critic.
     pub critic: Vec<usize>,
     /// Total number of updates.
     pub updates: u64,
-    /// Rows per minibatch.
+    /// Number of stored steps in a minibatch.
     pub batch: usize,
     /// Initial learning rate. A cosine schedule reduces it to a hundredth.
     pub rate: f64,
@@ -50,11 +51,11 @@ pub struct ValuationRecipe {
     pub burst: u64,
     /// Number of steps that the actor flies.
     pub window: usize,
-    /// Number of windows after which all episodes are reset with other targets.
+    /// Number of windows after which all episodes restart with other targets.
     pub windows: u64,
-    /// Number of updates between windows.
+    /// Number of updates between two windows of simulated flight.
     pub between: u64,
-    /// Capacity of the replay buffer, steps.
+    /// Capacity of the replay buffer, in steps.
     pub remembered: usize,
     /// Discount factor γ per step.
     pub discount: f64,
@@ -103,7 +104,7 @@ pub enum ValuationError {
 pub struct ValuationProgress {
     /// Number of updates made.
     pub updates: u64,
-    /// RMS relative error of the critics.
+    /// RMS relative error of the critics' values.
     pub error: f64,
     /// Number of steps flown.
     pub steps: u64,
@@ -125,7 +126,8 @@ pub struct Valuation<W> {
 }
 
 impl<W: World> Valuation<W> {
-    /// Starts learning critics of `actor` in `world`, whose number of aircraft must be the recipe's.
+    /// Starts the training of critics of `actor` in `world`. The number of aircraft in `world` must be that of the
+    /// recipe.
     ///
     /// # Errors
     ///
@@ -201,7 +203,8 @@ impl<W: World> Valuation<W> {
         Ok([critic(&self.critics[0])?, critic(&self.critics[1])?])
     }
 
-    /// Flies one window of a block: random actions, each held for some steps, then the actor's actions.
+    /// Simulates one window of a block of aircraft: random actions, each held for some steps, then the actor's
+    /// actions.
     fn fly(&mut self, block: usize) -> Result<(), ValuationError> {
         let mut rng = stream::stream(self.recipe.seed, &[FLY, self.flown, block as u64]);
         let count = WIDTH.min(self.world.instances() - block * WIDTH);
@@ -232,7 +235,8 @@ impl<W: World> Valuation<W> {
         Ok(())
     }
 
-    /// Stores the returns along a lane's path, from its end to its start. A return ends with its episode.
+    /// Stores the returns along the path of the aircraft in `lane`, from its end to its start. A return ends with its
+    /// episode.
     fn remember(
         &mut self,
         lane: usize,
@@ -244,7 +248,7 @@ impl<W: World> Valuation<W> {
         let worst = -(task.roll_cap + task.pitch_cap + task.airspeed_cap) as f32;
         let of = |numbers: &[Block; INPUTS]| numbers.map(|x| x.0[lane]);
         let (mut earned, mut weight, mut end) = (0.0, 1.0, of(beyond));
-        // the value after a time limit is unknown, and the steps before it are not stored
+        // the value after a time limit is unknown: the steps before it are not stored
         let mut known = true;
         for (at, stepped) in way.iter().rev() {
             match stepped.ended[lane] {
@@ -253,7 +257,7 @@ impl<W: World> Valuation<W> {
                         (stepped.reward.0[lane] + discount * earned, discount * weight)
                 }
                 Ended::Time => known = false,
-                // a lost aircraft has the smallest reward in all further steps
+                // a lost aircraft gets the smallest reward in all further steps
                 Ended::Lost => {
                     (earned, weight, known) = (worst / (1.0 - discount), 0.0, true);
                     end = of(at);

@@ -14,13 +14,13 @@ pub const CURVE: &str = "curve.csv";
 /// Column names.
 pub const COLUMNS: &str =
     "steps,updates,seconds,easy_deg,hard_deg,divergence_rate,loss,reward,episodes,lost";
-/// Fraction of the reduction from the first to the smallest error that defines the knee.
+/// At the knee of a curve, this fraction of the reduction from the first to the smallest error is reached.
 const KNEE: f64 = 0.9;
 
 /// One evaluation. Values that were not measured are NaN.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CurvePoint {
-    /// Environment steps so far, all aircraft together.
+    /// Number of environment steps so far, all aircraft together.
     pub steps: u64,
     /// Number of updates so far.
     pub updates: u64,
@@ -34,7 +34,7 @@ pub struct CurvePoint {
     pub divergence_rate: f64,
     /// Mean loss of the critics.
     pub loss: f64,
-    /// Mean reward per training step. TD3 counts it as `PolicyProgress::reward` does.
+    /// Mean reward per training step. For TD3, it is `PolicyProgress::reward`.
     pub reward: f64,
     /// Number of episodes started.
     pub episodes: u64,
@@ -60,8 +60,8 @@ impl CurvePoint {
         )
     }
 
-    /// Sum of both errors, degrees, or the negative reward if there is no evaluation. Infinite without either. The best
-    /// point has the smallest value.
+    /// Sum of the errors on easy and hard targets, degrees. Without an evaluation, the negative reward; infinite
+    /// without either. The best point has the smallest value.
     pub fn badness(&self) -> f64 {
         let error = self.easy_deg + self.hard_deg;
         match (error.is_nan(), self.reward.is_nan()) {
@@ -97,19 +97,20 @@ pub fn read(path: &Path) -> Result<Vec<CurvePoint>, CurveError> {
     rows.map_err(|source| CurveError { path: path.display().to_string(), source })
 }
 
-/// Index of the best point, the last one of equal points. `None` without points.
+/// Index of the best point; the last of several equal points. `None` without points.
 pub fn best(points: &[CurvePoint]) -> Option<usize> {
     (0..points.len()).rev().min_by(|a, b| points[*a].badness().total_cmp(&points[*b].badness()))
 }
 
-/// The knee of the curve: the first point with nine tenths of the reduction from the first error to the smallest.
-/// `None` without points.
+/// The knee of the curve: the first point at which nine tenths of the reduction from the first to the smallest error
+/// are reached. `None` without points.
 pub fn knee(points: &[CurvePoint]) -> Option<&CurvePoint> {
     let (first, best) = (points.first()?.badness(), points[best(points)?].badness());
     points.iter().find(|p| p.badness() <= first - KNEE * (first - best))
 }
 
-/// Spread of a quantity over several curves: interquartile mean (Agarwal et al. 2021), smallest and largest.
+/// Spread of a quantity over several curves, one for each seed: interquartile mean (Agarwal et al. 2021), smallest
+/// and largest value.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Spread {
     /// Interquartile mean over the seeds.
@@ -120,8 +121,8 @@ pub struct Spread {
     pub high: Vec<f64>,
 }
 
-/// The spread over `curves` of the quantity `get`, at each of the values `at` of the quantity `over`. Each curve is
-/// interpolated linearly. The spread is NaN where a curve has not begun or has ended.
+/// The spread over `curves` of the quantity `get`, at the values `at` of the quantity `over`. Each curve is
+/// interpolated linearly. The spread is NaN where any curve has not begun or has ended.
 pub fn spread(
     curves: &[&[CurvePoint]],
     over: impl Fn(&CurvePoint) -> f64,
@@ -152,19 +153,19 @@ pub fn spread(
     spread
 }
 
-/// A curve on disk that is extended.
+/// A curve in a file to which points are appended.
 pub struct CurveFile {
     file: File,
     points: Vec<CurvePoint>,
 }
 
 impl CurveFile {
-    /// Opens the curve in `path` to continue it after `steps`. Later points are removed, by an atomic replacement of the
-    /// file. A new curve is started if there is no file.
+    /// Opens the curve in `path` to continue it after `steps` environment steps. Later points are removed, by an
+    /// atomic replacement of the file. If there is no file, a new curve is started.
     ///
     /// # Errors
     ///
-    /// If there is a file that cannot be read, which is left as it is, or if the file cannot be written.
+    /// If there is a file that cannot be read, or if the file cannot be written. An unreadable file is left as it is.
     pub fn open(path: &Path, steps: u64) -> std::io::Result<CurveFile> {
         let mut points = match read(path) {
             Err(why) if why.is_not_found() => Vec::new(),
@@ -181,7 +182,7 @@ impl CurveFile {
         &self.points
     }
 
-    /// The smallest error so far; infinite before the first.
+    /// The smallest value of `CurvePoint::badness` so far; infinite without points.
     pub fn best(&self) -> f64 {
         best(&self.points).map_or(f64::INFINITY, |i| self.points[i].badness())
     }
@@ -247,12 +248,12 @@ mod tests {
         let error = CurveFile::open(&path, 10).map(|_| ()).unwrap_err();
         assert!(error.to_string().contains("curve.csv"), "{error}");
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "steps\nmany\n");
-        // A file that was made and not yet written is an empty curve.
+        // A file that was created but not yet written is an empty curve.
         std::fs::write(&path, "").unwrap();
         assert!(CurveFile::open(&path, 10).unwrap().points().is_empty());
     }
 
-    /// A program that ends while the curve is shortened leaves the old file or the new one.
+    /// If a program ends while it shortens the curve, the old file or the new file remains.
     #[test]
     fn a_curve_is_shortened_in_a_new_file() {
         use std::io::Read as _;
@@ -296,7 +297,7 @@ mod tests {
         assert_eq!(spread.middle[..3], [6.0, 4.5, 3.0]);
         assert_eq!((spread.low[1], spread.high[1]), (3.0, 6.0));
         assert!(spread.middle[3].is_nan());
-        // a curve before its first point
+        // a curve without points
         let empty = super::spread(&[&[]], |p| p.seconds, |p| p.easy_deg, &[0.0]);
         assert!(empty.middle[0].is_nan());
     }

@@ -5,7 +5,7 @@ use burn::tensor::{Device, Gradients, Tensor, TensorData, activation};
 use greylag_num::Dense;
 use greylag_num::dense::DenseError;
 
-/// A dense network as tensors: weights `[in, out]` with biases, layer after layer.
+/// A dense network as tensors: weights `[in, out]` and biases of each layer.
 #[derive(Clone, Debug)]
 pub struct Mlp {
     sizes: Vec<usize>,
@@ -14,9 +14,9 @@ pub struct Mlp {
 
 /// Adam for one network, in one pass over each of its tensors.
 ///
-/// burn's Adam makes a dozen passes, each with a new allocation. At the layer sizes of Table VII of \[GSFM26\] they
-/// take a tenth of a TD3 update. This code uses burn's operations in burn's order. A test checks that the results are
-/// equal to the bit.
+/// burn's Adam makes a dozen passes, each with a new allocation. At the layer sizes of Table VII of \[GSFM26\], they
+/// take a tenth of the time of a TD3 update. This code uses burn's operations in burn's order. A test checks that the
+/// results are equal to the bit.
 #[derive(Clone, Debug)]
 pub struct Optimiser {
     rate: f64,
@@ -35,7 +35,7 @@ struct Moment {
 /// Constants of a step, common to all parameters.
 struct Pace {
     rate: f32,
-    /// Bias correction of the mean divided by that of the root of the mean square.
+    /// Bias correction of the mean divided by the bias correction of the root mean square.
     ahead: f32,
     epsilon: f32,
 }
@@ -66,7 +66,7 @@ impl Mlp {
         Mlp { sizes: sizes.into(), layers: layers.collect() }
     }
 
-    /// Units of each layer, inputs first.
+    /// Number of units of each layer, inputs first.
     pub fn sizes(&self) -> &[usize] {
         &self.sizes
     }
@@ -81,7 +81,7 @@ impl Mlp {
         all
     }
 
-    /// The network for flight.
+    /// The network in the form that is evaluated in flight.
     ///
     /// # Errors
     ///
@@ -113,7 +113,7 @@ impl Mlp {
         Mlp { sizes: self.sizes.clone(), layers: self.layers.iter().map(pass).collect() }
     }
 
-    /// Moves each parameter by the fraction `tau` towards `other`'s (soft update).
+    /// Moves each parameter by the fraction `tau` towards that of `other` (soft update).
     pub fn approach(&mut self, other: &Mlp, tau: f64) {
         let [stay, go] = [(1.0 - tau) as f32, tau as f32];
         let layers = std::mem::take(&mut self.layers).into_iter().zip(&other.layers);
@@ -128,7 +128,7 @@ impl Mlp {
     }
 }
 
-/// `tensor` after `change` has updated its numbers from those of `other`, a tensor of the same shape.
+/// `tensor` after `change` has updated its numbers from those of `other`, which has the same shape.
 fn changed<const D: usize>(
     tensor: Tensor<D>,
     other: Tensor<D>,
@@ -157,7 +157,8 @@ impl Optimiser {
         Optimiser { rate, steps: 0, layers: layers.collect() }
     }
 
-    /// Updates `network` with the gradients of its `followed` copy in `gradients`.
+    /// Updates `network` by one step. `gradients` are those of the parameters of `followed`, its copy with tracked
+    /// gradients.
     pub fn step(&mut self, network: &mut Mlp, followed: Mlp, gradients: &mut Gradients) {
         self.steps += 1;
         let pace = Pace::of(self.steps, self.rate);
@@ -228,7 +229,7 @@ impl Pace {
 }
 
 impl Moment {
-    /// `parameter` after a step against its `slope`.
+    /// `parameter` after a descent step along its gradient `slope`.
     fn step<const D: usize>(
         &mut self,
         parameter: Tensor<D>,

@@ -1,4 +1,4 @@
-//! The replay buffer: the last transitions, from which minibatches are sampled.
+//! The replay buffer: the most recent transitions, from which minibatches are sampled.
 
 use rand::{Rng, RngExt};
 
@@ -19,7 +19,7 @@ pub struct Transition {
     pub goes_on: f32,
 }
 
-/// Numbers per transition.
+/// Number of values stored per transition.
 const NUMBERS: usize = 2 * OBSERVATIONS + ACTIONS + 2;
 
 /// A minibatch, row after row.
@@ -54,8 +54,8 @@ impl Replay {
         Replay { capacity, numbers: Vec::new(), added: 0 }
     }
 
-    /// The buffer with the contents [`numbers`](Replay::numbers) and [`added`](Replay::added); `None` if their count
-    /// does not fit the capacity.
+    /// The buffer with the contents [`numbers`](Replay::numbers) and [`added`](Replay::added) of an earlier buffer.
+    /// `None` if the number of values does not match the capacity.
     pub fn restore(capacity: usize, numbers: Vec<f32>, added: u64) -> Option<Replay> {
         let held = (capacity as u64).min(added) as usize;
         (numbers.len() == held * NUMBERS).then_some(Replay { capacity, numbers, added })
@@ -71,7 +71,7 @@ impl Replay {
         self.added
     }
 
-    /// The stored numbers, for a checkpoint.
+    /// All stored values, for a checkpoint.
     pub fn numbers(&self) -> &[f32] {
         &self.numbers
     }
@@ -147,7 +147,7 @@ mod tests {
             assert!(batch.action[3 * k..3 * k + 3].iter().all(|a| *a == x));
             assert!(batch.next[OBSERVATIONS * k..][..OBSERVATIONS].iter().all(|o| *o == -x));
         }
-        // each of ten is missed by 400 draws once in 10^18
+        // 400 draws miss a given one of ten transitions with a probability below 10⁻¹⁸
         assert_eq!(seen.iter().position(|s| *s), Some(15));
         assert!(seen[15..].iter().all(|s| *s));
     }

@@ -18,12 +18,12 @@ use greylag_control::policy::{ACTIONS, OBSERVATIONS};
 use greylag_num::Dense;
 use greylag_num::dense::DenseError;
 
-/// Hyperparameters; [`Hyperparameters::default`] is Table VII.
+/// Hyperparameters of TD3. Those of Table VII are [`Hyperparameters::default`].
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Hyperparameters {
-    /// Units of the actor's hidden layers.
+    /// Number of units of each hidden layer of the actor.
     pub actor: Vec<usize>,
-    /// Units of a critic's hidden layers.
+    /// Number of units of each hidden layer of a critic.
     pub critic: Vec<usize>,
     /// Discount factor γ per step.
     pub discount: f64,
@@ -33,7 +33,7 @@ pub struct Hyperparameters {
     pub actor_rate: f64,
     /// Learning rate of the critics.
     pub critic_rate: f64,
-    /// Critic updates per actor update, d.
+    /// Number d of critic updates per actor update.
     pub delay: u64,
     /// Standard deviation of the target policy's smoothing noise, σ.
     pub smoothing: f64,
@@ -41,7 +41,7 @@ pub struct Hyperparameters {
     pub smoothing_clip: f64,
     /// Standard deviation of the exploration noise.
     pub exploration: f64,
-    /// Rows per minibatch.
+    /// Number of transitions in a minibatch.
     pub batch: usize,
 }
 
@@ -88,13 +88,13 @@ pub struct Losses {
     pub critics: f32,
 }
 
-/// State of a [`Td3`]. For the actor and both critics it has the parameters of the network, those of the target
-/// network, and the optimiser's moments.
+/// State of a [`Td3`]: for the actor and both critics, the parameters of the network and of the target network, and
+/// the optimiser's moments.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Standing {
     /// Number of updates made.
     pub updates: u64,
-    /// State of actor, first critic and second critic: network, target network, moments.
+    /// States of actor, first critic and second critic, each with network, target network and moments.
     pub networks: [(Vec<f32>, Vec<f32>, Moments); 3],
 }
 
@@ -133,7 +133,7 @@ impl Td3 {
         })
     }
 
-    /// One update from `batch`, eqs. (1) to (3). `rng` draws the smoothing noise.
+    /// Makes one update from `batch`, eqs. (1) to (3). `rng` draws the smoothing noise.
     pub fn update(&mut self, batch: &Batch, rng: &mut impl Rng) -> Losses {
         let rows = |numbers: &[f32], width: usize| -> Tensor<2> {
             let data = TensorData::new(numbers.to_vec(), [batch.size, width]);

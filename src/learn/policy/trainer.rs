@@ -27,18 +27,19 @@ const UPDATE: u64 = 22;
 pub struct PolicyRecipe {
     /// Hyperparameters of TD3.
     pub td3: Hyperparameters,
-    /// Environment steps, all aircraft together.
+    /// Total number of environment steps, all aircraft together.
     pub steps: u64,
-    /// Warm-up steps with random actions and without updates.
+    /// Number of warm-up steps with random actions and without updates.
     pub warmup: u64,
     /// Capacity of the replay buffer, transitions.
     pub replay: usize,
     /// Number of simulated aircraft.
     pub instances: usize,
-    /// Fraction of the targets in the hard corners, 0..1.
+    /// Fraction of the targets in the corners of the target range (bank of 45° to 60° with pitch of 25° to 30°),
+    /// 0..1.
     pub corners: f64,
-    /// Steps between checkpoints. All episodes are reset at a checkpoint. A resumed training therefore equals an
-    /// uninterrupted one.
+    /// Number of steps between checkpoints. All episodes restart at a checkpoint. A resumed training therefore equals
+    /// an uninterrupted one.
     pub checkpoint: u64,
     /// Seed of all random numbers.
     pub seed: u64,
@@ -105,8 +106,8 @@ pub struct PolicyProgress {
     pub updates: u64,
     /// Mean loss of the critics; NaN before the first update.
     pub loss: f64,
-    /// Mean reward per step. A step that loses the aircraft counts here as the smallest reward of a single step (−1.1,
-    /// `Task::worst`). The critics learn the discounted sum of that reward over all further steps (−110,
+    /// Mean reward per step. A step in which an aircraft is lost counts here with the smallest reward of a single
+    /// step (−1.1, `Task::worst`). The critics learn the discounted sum of that reward over all further steps (−110,
     /// `Task::of_loss`).
     pub reward: f64,
     /// Number of episodes started.
@@ -133,8 +134,8 @@ pub struct PolicyStanding {
 }
 
 impl<W: World> PolicyTrainer<W> {
-    /// A training in `world`, whose number of aircraft must be the recipe's. `identity` distinguishes the training from
-    /// others.
+    /// A training in `world`, whose number of aircraft must be that of the recipe. `identity` distinguishes the
+    /// training from others.
     ///
     /// # Errors
     ///

@@ -86,7 +86,7 @@ impl Session {
         self.heard = host;
     }
 
-    /// Sends a message in the peer's version. A message whose id MAVLink 1 cannot carry is dropped.
+    /// Sends a message in the peer's version. To a MAVLink 1 peer, a message with an id above 255 is dropped.
     pub fn send(&mut self, message: &Message, from: Source, outbox: &mut Outbox) {
         self.send_as(self.version, message, from, outbox);
     }

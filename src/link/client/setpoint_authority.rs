@@ -4,12 +4,12 @@ use std::time::Duration;
 
 use crate::peer::PeerId;
 
-/// Silence after which another client may take control authority. It equals the default timeout that ends OFFBOARD: a
-/// restarted client has authority again when the aircraft changes to HOLD.
+/// Silence after which another client may take control authority. It equals the default timeout that ends OFFBOARD, so
+/// a restarted client can have authority again when the aircraft changes to HOLD.
 const RELEASE: Duration = Duration::from_secs(1);
 
-/// Holder of control authority for one kind of setpoint. It prevents two simultaneous streams from alternating on the
-/// surfaces.
+/// Holder of control authority for one kind of setpoint. Without it, two simultaneous streams would command the
+/// surfaces alternately.
 #[derive(Debug, Default)]
 pub struct SetpointAuthority {
     holder: Option<(PeerId, Duration)>,

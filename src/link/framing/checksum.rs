@@ -1,13 +1,14 @@
 //! Checksum of MAVLink frames: CRC-16/MCRF4XX.
 //!
-//! A log of an hour has a million frames. Most of the time for parsing them is spent on their checksums. The tables of
-//! the crate `crc` process 16 bytes at a time.
+//! A log of an hour has a million frames, and parsing them spends most of its time on checksums. The tables of the
+//! crate `crc` process 16 bytes at a time.
 
 use crc::{CRC_16_MCRF4XX, Crc, Table};
 
 static CHECKSUM: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_MCRF4XX);
 
-/// The checksum of a frame: `bytes` from behind the start marker to the end of the payload, then CRC_EXTRA.
+/// The checksum of a frame. `bytes` are those after the start marker up to the end of the payload. `extra` is
+/// CRC_EXTRA.
 pub(crate) fn checksum(bytes: &[u8], extra: u8) -> u16 {
     let mut digest = CHECKSUM.digest();
     digest.update(bytes);
@@ -21,7 +22,7 @@ mod tests {
 
     #[test]
     fn the_checksum_is_that_of_the_protocols_own_library() {
-        // the check value of CRC-16/MCRF4XX is that of the digits 1 to 9
+        // the published check value of CRC-16/MCRF4XX is the checksum of the digits 1 to 9
         assert_eq!(checksum(b"12345678", b'9'), 0x6F91);
         let mut seed = 1u32;
         let mut byte = || {

@@ -13,7 +13,8 @@ use super::STAMP_MAX;
 
 /// Interval between writes.
 const EVERY: Duration = Duration::from_secs(1);
-/// Range of timestamps that may have been used since the last write: 2 s, in units of 10 µs.
+/// Margin that is added to the stored timestamp at a start: 2 s, in units of 10 µs. Timestamps in this range may have
+/// been used since the last write.
 const MARGIN: u64 = 200_000;
 
 /// The timestamp cannot be stored.
@@ -70,7 +71,7 @@ impl StampFile {
             Ok(text) if text.trim().is_empty() => {
                 return Err(StampError::Empty { path: path.clone() });
             }
-            // no signature could be newer than the largest timestamp
+            // a timestamp close to the largest would leave none for new signatures
             Ok(text) => match text.trim().parse::<u64>() {
                 Ok(last) if last < STAMP_MAX - MARGIN => last,
                 _ => return Err(StampError::Content { path: path.clone() }),
@@ -135,7 +136,7 @@ fn keep(
                         "{} not written, signed frames may be replayed: {why}",
                         path.display()
                     );
-                    // nobody listens after the end of the flight
+                    // nobody receives it after the end of the flight
                     let _ = trouble.send(words);
                 }
                 Err(_) => {}

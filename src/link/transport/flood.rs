@@ -63,7 +63,7 @@ impl Senders {
         }
     }
 
-    /// Index of the bucket of `sender`: an existing, a free or an expired one. `None` if all buckets are in use.
+    /// Index of the bucket of `sender`: its own, a new or an expired bucket. `None` if all buckets are in use.
     fn place(&mut self, sender: SocketAddr, now: Instant) -> Option<usize> {
         let own = self.known.iter().position(|(known, _)| *known == sender);
         if own.is_some() {
@@ -121,7 +121,8 @@ mod tests {
             taken += u32::from(senders.may(sender(2 + (i % 60_000) as u16), now));
         }
         assert_eq!(own, 200);
-        // 4000 per second and the first burst for all other senders, and one per second for each tracked place.
+        // The other senders share 4000 per second and the first burst. Each of the 64 separate buckets adds about one
+        // per second.
         assert!(taken < 41_000 + 10 * 64, "{taken}");
     }
 }

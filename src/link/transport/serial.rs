@@ -20,7 +20,7 @@ const PARTIAL_FRAME_TIMEOUT: Duration = Duration::from_millis(50);
 const RETRY: Duration = Duration::from_millis(200);
 /// Longest time for writing a frame. The frame is then dropped, because the port is blocked.
 const STALLED: Duration = Duration::from_secs(1);
-/// Largest number of frames behind the frame that is being written. Older frames are obsolete.
+/// Largest number of frames that wait for the port. If there are more, the oldest are dropped as obsolete.
 const BACKLOG: usize = 16;
 /// Signs of a wrong baud rate: this many bytes without a valid frame, over at least this time.
 const NOISE: (u64, Duration) = (400, Duration::from_secs(1));

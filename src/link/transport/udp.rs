@@ -60,7 +60,7 @@ fn serve(
 }
 
 async fn receive(port: Port, socket: Arc<UdpSocket>) {
-    // one byte more than the largest accepted datagram, to detect longer ones
+    // one byte more than the largest accepted datagram, to detect longer datagrams
     let mut buffer = vec![0; MAX_DATAGRAM + 1];
     let mut senders = Senders::default();
     loop {

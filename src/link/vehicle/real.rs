@@ -78,8 +78,8 @@ pub struct Real {
     requests: Requests,
     /// Whether any frame of the controller had a signature.
     signs: bool,
-    /// Whether the controller receives a radio, as reported while the companion had no control authority; `None` before
-    /// the first report.
+    /// Whether the controller receives an RC transmitter, as reported while the companion had no control authority;
+    /// `None` before the first report.
     radio: Option<bool>,
     /// Delay margin of the loop through the surfaces; `None` if unknown.
     bears: Option<Duration>,
@@ -198,12 +198,12 @@ impl Real {
         self.write(&message)
     }
 
-    /// The attitude to command for `wanted` (rad): rate-limited, and with integral correction while the controller
-    /// tracks it.
+    /// The roll and pitch to send for the demanded `wanted`, rad: rate-limited, and with integral correction while the
+    /// controller flies them.
     fn commanded(&mut self, time: Time, wanted: [f64; 2]) -> [f64; 2] {
         let seen = self.assembly.attitude();
         if !self.flies() {
-            // until the controller flies the attitude, the aircraft's measured attitude is sent
+            // until the controller flies attitude setpoints, the measured attitude is sent
             self.ramp.rest();
             self.trim.rest();
             return self.ramp.command(time, wanted, seen);

@@ -83,8 +83,8 @@ pub struct Sitl {
 }
 
 impl Sitl {
-    /// A connection to the vehicle with the system id `system`. `travels` are those of its airframe. The vehicle
-    /// normalises surface positions by its own travels. If these differ, the vehicle cannot be engaged.
+    /// A connection to the vehicle with the system id `system`. `travels` are the surface travels of the airframe file.
+    /// The vehicle normalises surface positions by its own travels. If the two differ, the vehicle cannot be engaged.
     pub fn new(system: u8, travels: Travels) -> Self {
         let nan = f64::NAN;
         let nothing = Telemetry {
@@ -203,7 +203,7 @@ impl Sitl {
             self.counts.incomplete += 1;
             return None;
         };
-        // Both sides round to a millisecond.
+        // The timestamp in milliseconds may be rounded up or down.
         let off_ms = boot_ms.wrapping_sub((time.as_micros() / 1000) as u32);
         if time_b != time || time_c != time || !matches!(off_ms, 0 | 1 | u32::MAX) {
             self.counts.incomplete += 1;

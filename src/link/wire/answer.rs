@@ -95,7 +95,7 @@ pub fn texts(severity: Severity, words: &str, id: u16) -> Vec<Message> {
     if bytes.len() <= TEXT_CHUNK {
         return vec![text(severity, &bytes, 0, 0)];
     }
-    // A chunk shorter than the field ends the text. After an exact multiple an empty chunk follows.
+    // A chunk shorter than the field ends the text. A text that fills its last chunk is followed by an empty chunk.
     let ender = bytes.len().is_multiple_of(TEXT_CHUNK).then_some(&[][..]);
     bytes
         .chunks(TEXT_CHUNK)

@@ -210,13 +210,13 @@ fn measured(message: MavMessage) -> Option<ControllerMessage> {
             ControllerMessage::Wind { velocity, sd: WIND_COV_SD }
         }
         MavMessage::WIND(m) => {
-            // the direction from which the wind comes
+            // `direction` is the direction from which the wind comes
             let (sin, cos) = wide(m.direction).to_radians().sin_cos();
             let speed = wide(m.speed);
             let velocity = [-speed * cos, -speed * sin, wide(m.speed_z)];
             ControllerMessage::Wind { velocity, sd: WIND_SD }
         }
-        // A reply contains the other side's time, a request zero.
+        // A reply has the other side's time in `tc1`, and a request has zero.
         MavMessage::TIMESYNC(m) if m.tc1 != 0 => ControllerMessage::TimeSync { ours: m.ts1 },
         _ => return None,
     })
@@ -279,7 +279,7 @@ pub fn message_interval(to: Source, id: u32, interval_us: f32) -> Message {
 
 /// Request for a mode by the stack's mode number and sub mode (0 without one).
 pub fn set_mode(to: Source, main: u8, sub: u8) -> Message {
-    // MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
+    // The first parameter is MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
     command(to, SET_MODE, [1.0, f32::from(main), f32::from(sub)])
 }
 
@@ -304,7 +304,7 @@ pub fn manual_control(to: Source, [x, y, z]: [i16; 3]) -> Message {
     }))
 }
 
-/// RC_CHANNELS_OVERRIDE of channels 1 to 3, pulse widths in µs. 0 returns a channel to the radio.
+/// RC_CHANNELS_OVERRIDE of channels 1 to 3, pulse widths in µs. 0 returns a channel to the RC transmitter.
 pub fn channels_override(to: Source, [one, two, three]: [u16; 3]) -> Message {
     // 65535 leaves a channel unchanged
     let rest = u16::MAX;

@@ -118,8 +118,8 @@ pub fn read(frame: &Frame<'_>) -> Option<VehicleMessage> {
     })
 }
 
-/// Aileron, elevator, throttle, aileron rate, elevator rate, rudder, rudder rate; the rudder is 0 if it is not
-/// reported.
+/// Positions of aileron, elevator and throttle, rates of aileron and elevator, position and rate of the rudder. The
+/// rudder is 0 if it is not reported.
 fn outputs(active: u32, actuator: &[f64; 32]) -> [f64; 7] {
     let rudder = if active >= ALL { [actuator[7], actuator[8]] } else { [0.0; 2] };
     let [a, e, t, ar, er] = std::array::from_fn(|i| actuator[i]);

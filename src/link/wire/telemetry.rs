@@ -38,7 +38,7 @@ pub const STREAMS: [Stream; 14] = [
     stream(245, 1.0, 2),  // EXTENDED_SYS_STATE
     stream(24, 1.0, 2),   // GPS_RAW_INT
     stream(147, 1.0, 2),  // BATTERY_STATUS
-    stream(242, 0.5, 2),  // HOME_POSITION (MAVSDK waits for it rather than asks)
+    stream(242, 0.5, 2),  // HOME_POSITION (MAVSDK waits for it without a request)
     stream(2, 0.0, 12),   // SYSTEM_TIME
     stream(436, 0.0, 12), // CURRENT_MODE
     stream(NAMED_VALUE_FLOAT, 1.0, 12),
@@ -269,7 +269,7 @@ fn sys_status(status: &Status, scene: &Scene) -> MavMessage {
         | S::MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
         | S::MAV_SYS_STATUS_AHRS
         | S::MAV_SYS_STATUS_PREARM_CHECK;
-    // Without a fence none can be breached. MAVProxy reports a breach if this bit is missing.
+    // There is no geofence, so it counts as healthy. MAVProxy reports a breach if this bit is missing.
     let fence = S::MAV_SYS_STATUS_GEOFENCE;
     let health = if status.vehicle_alive { sensors | fence } else { fence };
     MavMessage::SYS_STATUS(SYS_STATUS_DATA {

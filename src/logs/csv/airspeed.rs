@@ -4,10 +4,10 @@ use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, standard_density};
 
 use crate::Sample;
 
-/// Converts equivalent into true airspeed; returns a note on the density used.
+/// Converts equivalent airspeed into true airspeed. Returns a note on the densities used.
 ///
-/// Airspeed and density may be in different rows, so the last logged density holds, else that of the standard atmosphere
-/// at the last logged altitude.
+/// Airspeed and density may be in different rows, so the last logged density is used. Without a logged density, the
+/// standard atmosphere gives the density at the last logged altitude, or at sea level.
 pub(super) fn make_true(rows: &mut [Sample]) -> String {
     let (mut density, mut altitude) = (f64::NAN, f64::NAN);
     let mut by = [0usize; 3];

@@ -5,12 +5,12 @@
 
 use crate::mapping::{Mapping, table_rules};
 
-/// Another name for a column: the column, the name, and the factor to the column's unit.
+/// Another name for a column: the column, that name, and the factor to the column's unit.
 struct Alias(&'static str, &'static str, f64);
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 const FOOT: f64 = 0.3048;
-/// A slug per cubic foot, kg/m³.
+/// One slug per cubic foot in kg/m³.
 const SLUG_PER_FOOT3: f64 = 515.378_8;
 
 /// JSBSim's own output, in degrees and feet, then its properties.
@@ -63,7 +63,7 @@ const JSBSIM: [Alias; 46] = [
     Alias("throttle_cmd", "fcs/throttle-cmd-norm[0]", 1.0),
 ];
 
-/// PX4's fields that mean one thing only, as ulog2csv writes them.
+/// PX4's fields whose name has only one meaning, as ulog2csv writes them.
 const PX4: [Alias; 17] = [
     Alias("p_radps", "rollspeed", 1.0),
     Alias("q_radps", "pitchspeed", 1.0),
@@ -84,7 +84,7 @@ const PX4: [Alias; 17] = [
     Alias("throttle_cmd", "control[3]", 1.0),
 ];
 
-/// Names of the time column, with the unit in s; 0 where the unit follows from the steps.
+/// Names of the time column, with the unit in s. A unit of 0 is to be found from the steps.
 const TIMES: [(&str, f64); 12] = [
     ("Time", 1.0),
     ("timestamp", 0.0),
@@ -100,7 +100,7 @@ const TIMES: [(&str, f64); 12] = [
     ("datetime", 0.0),
 ];
 
-/// The parts of a quaternion, w first.
+/// Names of the components of a quaternion, w first.
 const QUATERNIONS: [[&str; 4]; 6] = [
     ["q[0]", "q[1]", "q[2]", "q[3]"],
     ["q0", "q1", "q2", "q3"],
@@ -117,7 +117,7 @@ pub(super) struct Found {
     pub column: String,
     /// Name of the column in the file.
     pub field: String,
-    /// Factor from the file's unit.
+    /// Factor from the file's unit to the column's unit.
     pub scale: f64,
     /// Offset that is added after the factor.
     pub offset: f64,
@@ -130,7 +130,7 @@ pub(super) struct Dialect {
     pub found: Vec<Found>,
     /// The quaternion's columns, w first unless the samples show another order.
     pub quaternion: Option<[String; 4]>,
-    /// Whether the time column has an unknown unit, to be found from its steps.
+    /// Whether the unit of the time column is unknown and is to be found from its steps.
     pub time_by_steps: bool,
     /// Whether the airspeed is equivalent airspeed.
     pub equivalent: bool,

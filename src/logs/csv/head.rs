@@ -10,20 +10,20 @@ use crate::columns::{COLUMNS, EITHER, NEEDED, Place, index};
 use crate::mapping::{Entry, Mapping, TEXT};
 use crate::{Sample, mixed};
 
-/// Where a field goes: place, scale, offset; whether it is one part of a sum.
+/// Destination of a field: column, scale and offset, and whether the field is one term of a sum.
 type Target = (Place, f64, f64, Share);
 
-/// Whether a field is a column, or one of several surfaces that make one.
+/// Whether a field fills a column alone, or is one of several surfaces whose sum fills it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Share {
     Whole,
     OneOfSeveral,
 }
 
-/// Where one field goes.
+/// Destinations of one field.
 enum To {
     Nowhere,
-    /// A column without scale and offset, as most fields are.
+    /// A single column without scale and offset, which is the usual case.
     Column(Place),
     Targets(Vec<Target>),
 }
@@ -40,18 +40,18 @@ impl To {
     }
 }
 
-/// Where the fields of a table go.
+/// Destinations of the fields of a table.
 pub(super) struct Head {
     fields: Vec<To>,
-    /// Meaning of names that are not those of the log format.
+    /// Columns of the file whose names are not those of the log format.
     pub dialect: Dialect,
-    /// Fields of a quaternion.
+    /// Indices of the fields of a quaternion, if the table has one.
     quaternion: Option<[usize; 4]>,
     decimal: Decimal,
 }
 
 impl Head {
-    /// The targets of fields with these names, and their table without rows.
+    /// Finds the destinations of fields with these `names`. Also returns the table, which has no rows yet.
     pub fn of(names: &[String], delimiter: u8, path: &Path, mapping: &Mapping) -> (Head, Raw) {
         let dialect = Dialect::of(names, mapping);
         let mut targets: Vec<Vec<Target>> =
@@ -103,7 +103,7 @@ impl Head {
         sample.time_s.is_finite().then_some(sample)
     }
 
-    /// The parts of the quaternion in a record, if the table has one.
+    /// The components of the quaternion in a record, if the table has one.
     pub fn quaternion(&self, record: Fields<'_>) -> Option<[f64; 4]> {
         let part = |i| record.get(i).and_then(|f| number(f, self.decimal)).unwrap_or(f64::NAN);
         self.quaternion.map(|q| q.map(part))
@@ -118,7 +118,7 @@ fn put((place, scale, offset, share): &Target, x: f64, sample: &mut Sample) {
     *place = if sums { *place + value } else { value };
 }
 
-/// How decimals may be written.
+/// Decimal separators that are accepted.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Decimal {
     Point,
@@ -142,12 +142,12 @@ fn number(field: &[u8], decimal: Decimal) -> Option<f64> {
     plain.or_else(comma).or_else(|| dialect::time(field))
 }
 
-/// Powers of ten that a number holds exactly.
+/// Powers of ten that an `f64` represents exactly.
 const TENS: [f64; 16] =
     [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
 
-/// A number of at most 15 digits without an exponent, which most fields hold: numerator and denominator are exact, so
-/// that the quotient is the number nearest to the decimal one (Clinger 1990).
+/// Reads a number of at most 15 digits without an exponent, which most fields hold; `None` for another text.
+/// Numerator and denominator are exact, so their quotient is the number nearest to the decimal one (Clinger 1990).
 fn short(field: &[u8]) -> Option<f64> {
     let (sign, digits) = match field {
         [b'-', rest @ ..] => (-1.0, rest),
@@ -183,7 +183,7 @@ fn short(field: &[u8]) -> Option<f64> {
     (1..TENS.len()).contains(&count).then(|| sign * (whole as f64 / TENS[behind]))
 }
 
-/// The number that eight digits write (Lemire, "Quickly parsing eight digits"). `None` if one of them is not a digit.
+/// Reads eight digits as a number (Lemire, "Quickly parsing eight digits"). `None` if one of them is not a digit.
 fn eight(digits: [u8; 8]) -> Option<u64> {
     const ZEROS: u64 = 0x3030_3030_3030_3030;
     const ABOVE: u64 = 0x4646_4646_4646_4646;
@@ -199,7 +199,7 @@ fn eight(digits: [u8; 8]) -> Option<u64> {
     Some((10_000 * fours + (fours >> 32)) & 0xFFFF_FFFF)
 }
 
-/// Where the file's column `name` goes.
+/// Destinations of the file's column `name`.
 fn targets(name: &str, mapping: &Mapping, dialect: &Dialect) -> Vec<Target> {
     let mut targets: Vec<Target> = mapping
         .of_topic(TEXT)
@@ -235,7 +235,7 @@ fn lacking(names: &[String], mapping: &Mapping) -> Option<String> {
     })
 }
 
-/// The needed columns that are not among `names`, each with what would satisfy it.
+/// The required columns that are not among `names`, each with a remedy.
 fn missing_columns(names: &[String], mapping: &Mapping, path: &Path) -> Vec<CsvError> {
     let has = |column: &str| {
         let name = mapping.get(column).map_or(column, |entry| &entry.field);

@@ -27,7 +27,7 @@ fn turned(q: [f64; 4], order: Order) -> Option<UnitQuaternion<f64>> {
 
 /// The order in which the quaternions agree best with the body rates and with gravity in the specific force.
 ///
-/// The norm does not depend on the order: it only distinguishes a quaternion from other numbers.
+/// The norm does not depend on the order. It only distinguishes a quaternion from other numbers.
 pub(super) fn order(rows: &[Sample], quaternions: &[[f64; 4]]) -> Order {
     let misfit = |order: Order| {
         let (mut sum, mut weight) = (0.0, 0.0);

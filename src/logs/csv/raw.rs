@@ -1,4 +1,4 @@
-//! A table as read from its file, before rows are judged.
+//! A table as read from its file, before unusable rows are dropped.
 
 use std::io::BufRead;
 use std::path::Path;
@@ -19,7 +19,7 @@ use crate::stretches::{Keep, Stretches};
 use crate::topics::period_s;
 use crate::{Sample, rows};
 
-/// A table as read from its file, before rows are judged.
+/// A table as read from its file, before unusable rows are dropped.
 #[derive(Default)]
 pub(crate) struct Raw {
     /// The rows that could be read and have a time.
@@ -28,7 +28,7 @@ pub(crate) struct Raw {
     pub(super) places: Vec<usize>,
     /// Numbers of the file's rows before each row that could not be read.
     pub(super) unreadable: Vec<usize>,
-    /// The needed columns that it lacks.
+    /// The required columns that the table lacks.
     pub missing: Vec<CsvError>,
     pub(crate) unknown_columns: Vec<String>,
     pub(super) cut_short: bool,
@@ -38,17 +38,19 @@ pub(crate) struct Raw {
     pub(crate) whole: Option<Whole>,
 }
 
-/// Backward jump of time that begins another recording: in median sample periods, and in s.
+/// Backward jump of time above which another recording may begin: in median sample periods, and in s.
 const BACK_PERIODS: f64 = 10.0;
 const BACK_S: f64 = 1.0;
-/// A new recording starts within this fraction of the previous recording's duration after that one's start.
+/// The first time of a new recording lies within this fraction of the previous recording's time span, counted from
+/// the start of that span.
 const BEGINS: f64 = 0.1;
 /// Smallest number of rows of a recording.
 const RECORDING: usize = 50;
 
 impl Raw {
-    /// Judges every row by `judge`, also those that could not be read (`None`). `judge` gets the row's number, the row
-    /// and the rows that are kept before it. The kept rows stay in place, because a copy of a long table is large.
+    /// Calls `judge` for every row, also for those that could not be read (`None`). `judge` gets the row's number,
+    /// the row and the rows kept before it, and returns the row if it is usable. The kept rows stay in place, because
+    /// a copy of a long table is large.
     pub(super) fn judged(
         &mut self,
         judge: impl Fn(&mut rows::Rows, usize, Option<Sample>, &[Sample]) -> Option<Sample>,
@@ -84,7 +86,8 @@ impl Raw {
         }
     }
 
-    /// Where rows are left out between stretches: the times of the rows on both sides, s.
+    /// Times (s) of the last row before and of the first row after each place at which rows are left out between
+    /// stretches.
     fn pauses(&self) -> impl Iterator<Item = (f64, f64)> {
         let pairs = self.rows.windows(2).zip(self.places.windows(2));
         let left_out =
@@ -92,7 +95,7 @@ impl Raw {
         left_out.map(|(rows, _)| (rows[0].time_s, rows[1].time_s))
     }
 
-    /// Longest time between the stretches that are kept, s; 0 if the whole table is kept.
+    /// Longest time between the kept stretches, s, with a margin of 1 %; 0 if the whole table is kept.
     pub fn bridged_s(&self) -> f64 {
         self.pauses().map(|(from, to)| 1.01 * (to - from)).fold(0.0, f64::max)
     }
@@ -110,14 +113,14 @@ impl Raw {
         channel.largest_gap_s = self.whole.as_ref().map_or(0.0, |whole| whole.watch.largest_gap_s);
     }
 
-    /// Where a column with these values at `times` (s) is frozen, in the whole table; `None` if all of it is kept.
+    /// Intervals (from, to, s) of the whole table in which a column is frozen. Its kept values are `values` at
+    /// `times` (s). `None` if the whole table is kept.
     pub fn frozen(&self, column: &str, times: &[f64], values: &[f64]) -> Option<Vec<(f64, f64)>> {
         let (whole, place) = (self.whole.as_ref()?, index(column)?);
         Some(frozen_of(column, times, values, whole.watch.stays(place)))
     }
 
-    /// The recordings that follow one another in the table: each begins where the time goes back
-    /// and stays there.
+    /// The successive recordings in the table. A recording begins where the time goes back and stays there.
     pub fn recordings(self) -> Vec<Raw> {
         let times: Vec<f64> = self.rows.iter().map(|s| s.time_s).collect();
         let back = (BACK_PERIODS * period_s(&times)).max(BACK_S);
@@ -125,7 +128,7 @@ impl Raw {
         for i in 1..times.len() {
             let whole = i - bounds[bounds.len() - 1] >= RECORDING && times.len() - i >= RECORDING;
             let goes_back = times[i] < times[i - 1] - back;
-            // A clock that is corrected jumps back by some seconds; a new recording starts again near the first time.
+            // A corrected clock jumps back by some seconds; a new recording starts again near the first time.
             let start = times[bounds[bounds.len() - 1]];
             let begins = times[i] < start + (BEGINS * (times[i - 1] - start)).max(back);
             let stays = || times[i..i + RECORDING].iter().all(|t| *t < times[i - 1] - 0.5 * back);
@@ -158,12 +161,12 @@ impl Raw {
     }
 }
 
-/// Reads the rows of a text in memory; `mapping` may assign columns with other names or units.
+/// Reads the rows of a table. `mapping` may assign columns with other names or units.
 pub(crate) fn raw(bytes: &[u8], path: &Path, mapping: &Mapping) -> Result<Raw, CsvError> {
     read(&mut &bytes[..], path, mapping, Keep::All)
 }
 
-/// Reads the rows of a text; `mapping` may assign columns with other names or units.
+/// Reads the rows of a table. `mapping` may assign columns with other names or units.
 pub(crate) fn read(
     source: &mut dyn BufRead,
     path: &Path,
@@ -178,7 +181,7 @@ pub(crate) fn read(
     let names: Vec<String> = (0..count).filter_map(name).map(|n| n.trim().to_owned()).collect();
     let (head, mut out) = Head::of(&names, records.delimiter, path, mapping);
     let mut quaternions: Vec<[f64; 4]> = Vec::new();
-    // Stretches are selected by row numbers, but gaps are found by times, whose unit must be known.
+    // Gaps are found by times. A table whose time unit is not known yet is therefore kept whole.
     let mut thin = Thin::new(if head.dialect.time_by_steps { Keep::All } else { keep });
     let mut number = 0;
     while let Some(record) = records.next().map_err(text)? {
@@ -191,7 +194,7 @@ pub(crate) fn read(
                 quaternions.extend(head.quaternion(record));
             }
             Some(_) => {}
-            // A quote that is not closed takes the lines behind it into its record: each of them is lost.
+            // A quote that is not closed draws the lines after it into its record. Each of these lines is lost.
             None => {
                 let lines = record.lines();
                 out.unreadable.extend(number..number + lines);
@@ -223,7 +226,7 @@ pub(crate) fn read(
     Ok(out)
 }
 
-/// Converts times to seconds; their unit follows from their steps.
+/// Converts times to seconds. Their unit follows from their steps.
 fn in_seconds(rows: &mut [Sample]) {
     let times: Vec<f64> = rows.iter().map(|s| s.time_s).collect();
     let unit = dialect::unit_of(period_s(&times));

@@ -1,11 +1,11 @@
-//! The records of a table, line by line. Most tables have no quotes, so that their fields are read in place.
+//! Reads the records of a table line by line. Most tables have no quotes, so their fields are read without a copy.
 
 use std::io::{self, BufRead, Cursor, Read};
 use std::ops::Range;
 
 use memchr::{memchr_iter, memchr2};
 
-/// Whole lines of a source. A last line without its end is held back, because it may lack digits.
+/// Whole lines of a source. A last line without its end is left out, because it may lack digits.
 pub(super) struct Lines<'a> {
     source: &'a mut dyn BufRead,
     line: Vec<u8>,
@@ -46,12 +46,13 @@ impl Read for Lines<'_> {
 
 type Quoted<'a> = ::csv::Reader<io::Chain<Cursor<Vec<u8>>, Lines<'a>>>;
 
-/// Where the records come from.
+/// Source of the records.
 enum Origin<'a> {
     Plain(Lines<'a>),
-    /// From the first line that has a quote, or a carriage return within it.
+    /// A reader that handles quotes. It is used from the first line that has a quote, or a carriage return within the
+    /// line.
     Quoted(Box<Quoted<'a>>),
-    /// After an error.
+    /// No source, after an error.
     Nothing,
 }
 
@@ -69,7 +70,7 @@ pub(super) struct Records<'a> {
 #[derive(Clone, Copy)]
 pub(super) struct Fields<'a> {
     bytes: &'a [u8],
-    /// Where each field ends; the next one begins behind the separator, or at once.
+    /// End of each field in `bytes`. The next field begins `between` bytes after it.
     ends: &'a [usize],
     between: usize,
 }
@@ -88,7 +89,7 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// Number of lines that the record spans; more than one with a line end between quotes.
+    /// Number of lines that the record spans. It is more than one if a quoted field contains line ends.
     pub fn lines(self) -> usize {
         let open = self.bytes.last().is_none_or(|b| *b != b'\n');
         memchr_iter(b'\n', self.bytes).count() + usize::from(open)
@@ -100,7 +101,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// Separator of a table's columns: commas, else semicolons or tabs.
+/// Separator of a table's columns: a comma, else a semicolon or a tab, whichever is more frequent.
 fn separator(header: &[u8]) -> u8 {
     let count = |by: u8| header.iter().filter(|b| **b == by).count();
     if count(b',') > 0 && count(b';') <= count(b',') {
@@ -143,7 +144,7 @@ impl<'a> Records<'a> {
         Ok(Some(Fields { bytes: self.record.as_slice(), ends: &self.ends, between: 0 }))
     }
 
-    /// Reads the next line that is not empty, without a quote; returns its place in the lines.
+    /// Reads the next line that is not empty and has no quote. Returns its range in the line buffer.
     fn plain(&mut self) -> Result<Option<Range<usize>>, ::csv::Error> {
         while let Origin::Plain(lines) = &mut self.from {
             if !lines.next()? {
@@ -203,7 +204,7 @@ fn content(line: &[u8]) -> &[u8] {
 mod tests {
     use super::*;
 
-    /// The records by this reader, and by one that knows quotes from the beginning on.
+    /// The records from this reader, and from one that handles quotes from the beginning on.
     fn both(text: &[u8]) -> [Vec<Vec<Vec<u8>>>; 2] {
         let mut source = io::BufReader::with_capacity(7, text);
         let mut records = Records::new(&mut source);

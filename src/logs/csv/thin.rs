@@ -1,11 +1,11 @@
-//! Stretches of a long table: an inspection parses every row and keeps only some.
+//! Stretches of a long table. An inspection parses every row but keeps only those in the stretches.
 
 use crate::Sample;
 use crate::columns::COLUMNS;
 use crate::phases::{self, Flying};
 use crate::stretches::{Keep, Level, MOST, Stretches, Watch};
 
-/// Rows of a stretch.
+/// Number of rows in a stretch.
 pub(super) const STRETCH: usize = 4096;
 /// For the phases of the whole table, one airspeed in this number of rows is kept.
 const COARSE: usize = 16;
@@ -18,7 +18,7 @@ pub(super) struct Thin {
     keep: Keep,
     level: Level,
     watch: Watch,
-    /// Times and airspeeds, s and m/s.
+    /// Times (s) and airspeeds (m/s) at intervals of [`COARSE`] rows.
     air: Vec<(f64, f64)>,
     due: bool,
     last_s: f64,
@@ -52,7 +52,7 @@ impl Thin {
         }
     }
 
-    /// Whether `rows` are too many; if so, half of the stretches are dropped.
+    /// Whether more `rows` are kept than the limit. If so, half of the stretches are no longer selected.
     pub fn is_full(&mut self, rows: usize) -> bool {
         let fewer = (self.keep == Keep::Stretches && rows > MOST).then(|| self.level.halved());
         self.level = fewer.flatten().unwrap_or(self.level);

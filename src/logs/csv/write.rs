@@ -28,7 +28,7 @@ pub fn save(flight: &Flight, path: &Path) -> Result<(), CsvError> {
     write(flight, std::io::BufWriter::new(file)).map_err(fail("write"))
 }
 
-/// Writes rows as they come.
+/// Writes a log row by row.
 #[derive(Debug)]
 pub struct Rows<W: Write> {
     out: W,

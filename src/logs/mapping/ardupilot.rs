@@ -1,7 +1,7 @@
-//! ArduPilot's DataFlash records as columns.
+//! Rules from ArduPilot's DataFlash records to the columns of the table.
 //!
-//! Not mapped: V-tails, differential spoilers, several motors, and the wind of XKF2, which the log
-//! format has no column for.
+//! Not mapped: V-tails, differential spoilers, several motors, and the wind of XKF2, for which the log format has no
+//! column.
 
 use super::rule::Rule;
 use super::servos;
@@ -14,7 +14,7 @@ pub const TOPICS: [&str; 13] = [
     "QTUN",
 ];
 
-/// AETR's full deflection, centidegrees.
+/// Value of AETR at full deflection, centidegrees.
 const FULL: f64 = 4500.0;
 
 /// The rules, preferred ones first.

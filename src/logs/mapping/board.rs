@@ -1,4 +1,4 @@
-//! Axes of a log that are not the body's: an autopilot's board, or the markers of a motion capture.
+//! Rotation of a log into body axes, if its axes are those of an autopilot's board or of motion-capture markers.
 
 use std::fmt;
 
@@ -12,18 +12,18 @@ use crate::Sample;
 /// ```toml
 /// [board]
 /// roll_deg = 0.0
-/// pitch_deg = -9.0       # its nose 9° under the body's
+/// pitch_deg = -9.0       # the board's nose is 9° below the body's
 /// yaw_deg = 0.0
-/// airflow = "board"      # alpha and beta are of its axes too, as a motion capture makes them; "body" (usual) for vanes
+/// airflow = "board"      # alpha and beta refer to the board too (motion capture); "body" (default): vanes
 /// ```
 ///
-/// The three angles (ZYX, as PX4's SENS_BOARD_X_OFF to Z_OFF) turn the body's axes into the board's. Attitude, body
-/// rates and specific force are turned back.
+/// The three angles (ZYX, as PX4's SENS_BOARD_X_OFF to Z_OFF) rotate the body's axes into the board's. Attitude, body
+/// rates and specific force of the log are rotated back into body axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Board {
     degrees: [f64; 3],
     airflow: Airflow,
-    /// Coordinates of the board to those of the body.
+    /// Rotation of coordinates from board axes to body axes.
     to_body: Rotation3<f64>,
 }
 
@@ -64,7 +64,7 @@ impl TryFrom<WrittenBoard> for Board {
 }
 
 impl Board {
-    /// Turns a row into the axes of the body.
+    /// Rotates a row from the board's axes into body axes.
     pub(crate) fn turn(&self, row: &mut Sample) {
         let body = |x: [f64; 3]| (self.to_body * Vector3::from(x)).into();
         row.rates_radps = body(row.rates_radps);

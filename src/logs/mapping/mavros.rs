@@ -1,11 +1,12 @@
-//! MAVROS's topics as columns.
+//! Rules from MAVROS's topics to the columns of the table.
 //!
-//! MAVROS publishes body axes forward-left-up (FLU) and earth axes east-north-up (ENU), also where `frame_id` names
-//! the body for a velocity over ground (`local_position/velocity_local`). `vfr_hud` is the autopilot's own airspeed,
-//! which is equivalent airspeed.
+//! MAVROS publishes in body axes forward-left-up (FLU) and earth axes east-north-up (ENU). The velocity over ground
+//! (`local_position/velocity_local`) is in earth axes although its `frame_id` names the body. The airspeed of
+//! `vfr_hud` is the autopilot's own equivalent airspeed.
 //!
-//! Not mapped: `local_position/velocity_body`, which needs the attitude of the same instant; `wind_estimation`, which
-//! the log format has no column for; `rc/out` without an airframe file, as no topic says what its channels move.
+//! Not mapped: `local_position/velocity_body`, which needs the attitude of the same instant; `wind_estimation`, for
+//! which the log format has no column; `rc/out` without an airframe file, because no topic states which surface a
+//! channel moves.
 
 use super::rule::{Axes, Rule, Tilt};
 use super::servos;
@@ -26,7 +27,7 @@ pub const TOPICS: [&str; 10] = [
     "extended_state",
 ];
 
-/// Fields that the rules use; a name that ends with a point or a bracket matches all that begin so.
+/// Fields that the rules use. A name that ends with a point or a bracket matches every field that begins with it.
 const FIELDS: [&str; 10] = [
     "orientation.",
     "angular_velocity.",

@@ -1,4 +1,4 @@
-//! Which topic of a log becomes which column.
+//! Mapping from the topics of a log to the columns of the table.
 //!
 //! Each binary format has rules in order of preference; a mapping file overrides them by column:
 //!
@@ -10,14 +10,15 @@
 //! roll_rad = { from = "csv.roll_deg", scale = 0.0174533 }         # another column of a CSV
 //! ```
 //!
-//! `[attitude] quaternion = ["csv.qx", "csv.qy", "csv.qz", "csv.qw"]` derives roll, pitch and yaw from a quaternion of
-//! earth axes NED to body axes FRD; `order = "wxyz"` or `"xyzw"` states which part is first.
+//! `[attitude] quaternion = ["csv.qx", "csv.qy", "csv.qz", "csv.qw"]` derives roll, pitch and yaw from a quaternion
+//! of earth axes NED to body axes FRD; `order = "wxyz"` or `"xyzw"` states whether w is first or last.
 //!
-//! A column's value is scale × field + offset. `instance` is the topic's number (ULog, DataFlash, ROS bag)
-//! or system/component (telemetry log). With `rate_over_s` the column is the rate of change of the field, from a
-//! parabola fitted to the rows of so many seconds. `[derive] body_rates_over_s` computes p, q, r from roll, pitch and yaw
-//! in the same way. `[board]` rotates the axes of a log (see [`Board`]). `[flight]` sets the criteria for flight:
-//! `from_mps` (airspeed; a model's envelope takes precedence) and `shortest_s` (0.5 s at least). `[sensors]` describes sensors and wind, see [`Sensors`].
+//! A column's value is scale × field + offset. `instance` is the topic's number (ULog, DataFlash, ROS bag) or
+//! system/component (telemetry log). With `rate_over_s` the column is the rate of change of the field: the slope of a
+//! parabola fitted to the rows within that many seconds. `[derive] body_rates_over_s` computes p, q, r from roll,
+//! pitch and yaw in the same way. `[board]` rotates the axes of a log (see [`Board`]). `[flight]` sets the criteria
+//! for flight: `from_mps` (airspeed; a model's envelope takes precedence) and `shortest_s` (at least 0.5 s).
+//! `[sensors]` describes sensors and wind, see [`Sensors`].
 
 mod ardupilot;
 mod board;
@@ -74,11 +75,11 @@ pub struct Entry {
     pub topic: String,
     /// Name of the field.
     pub field: String,
-    /// Factor from the field's unit.
+    /// Factor that converts the field to the column's unit.
     pub scale: f64,
-    /// Summand, in the column's unit.
+    /// Constant that is added to the scaled field, in the column's unit.
     pub offset: f64,
-    /// The topic's instance; the first one if none is named.
+    /// The topic's instance; `None` leaves the choice to the reader.
     pub instance: Option<u16>,
     /// Time span of the parabola whose slope is the column's value, s; `None` for the field itself.
     pub rate_over_s: Option<f64>,
@@ -89,11 +90,11 @@ pub struct Entry {
 pub struct Mapping {
     /// Source of each mapped column.
     entries: BTreeMap<String, Entry>,
-    /// Time span of the differentiation of the attitude to body rates, s.
+    /// Time span over which the attitude is differentiated to give body rates, s.
     body_rates_over_s: Option<f64>,
     /// Known properties of sensors and wind.
     sensors: Sensors,
-    /// Source of the attitude, if it is a quaternion.
+    /// Source of the attitude, if the mapping names a quaternion.
     quaternion: Option<Turn>,
     /// Orientation of the log's axes in the body.
     board: Option<Board>,
@@ -110,8 +111,8 @@ pub struct Turn {
     pub topic: String,
     /// Fields of the four components, in the order of the file.
     pub fields: [String; 4],
-    /// Order of the components. If `None`, that of a CSV table is found from body rates and gravity; other formats have
-    /// wxyz.
+    /// Order of the components. If it is `None`, the order in a CSV table is found from body rates and gravity; in
+    /// other formats it is wxyz.
     pub order: Option<Order>,
 }
 
@@ -184,7 +185,7 @@ impl Mapping {
         &self.sensors
     }
 
-    /// Time over which body rates are made from the attitude, s.
+    /// Time span over which the attitude is differentiated to give body rates, s.
     pub(super) fn body_rates_over_s(&self) -> Option<f64> {
         self.body_rates_over_s
     }
@@ -194,7 +195,7 @@ impl Mapping {
         self.entries.iter().filter_map(|(column, e)| Some((column.as_str(), e.rate_over_s?)))
     }
 
-    /// Source of a column of a CSV table: a column of the file or a derivation.
+    /// Source of a column of a CSV table in words: a column of the file, or a derivation.
     pub(super) fn origin(&self, column: &str) -> String {
         match self.get(column) {
             Some(e) if e.rate_over_s.is_some() => format!("rate of {}", e.field),
@@ -213,7 +214,7 @@ impl Mapping {
         }
     }
 
-    /// Sets the mixer; the log names this aircraft's surfaces and motors.
+    /// Sets the airframe's mixer, by which outputs of surfaces and motors in the log are converted to columns.
     pub fn with_mixer(self, mixer: Option<Mixer>) -> Mapping {
         Mapping { mixer, ..self }
     }
@@ -241,13 +242,13 @@ impl Mapping {
             .map(|(column, e)| (column.as_str(), e))
     }
 
-    /// Whether a topic is used.
+    /// Whether the mapping itself reads a topic.
     pub(super) fn uses(&self, topic: &str) -> bool {
         let turn = self.quaternion.as_ref().is_some_and(|q| q.topic == topic);
         turn || self.entries.values().any(|e| e.topic == topic)
     }
 
-    /// The mapping's rules followed by the format's own for the other columns.
+    /// The mapping's rules, then the rules of the format for the remaining columns.
     pub(super) fn rules(&self, format: Format, topics: &Topics) -> Vec<Rule> {
         let own = self.entries.iter().map(|(column, e)| {
             Rule::linear(column, &e.topic, &e.field, e.scale).plus(e.offset).of(e.instance).own()
@@ -255,7 +256,8 @@ impl Mapping {
         let others = match format {
             Format::Csv => Vec::new(),
             Format::Ulog => px4::rules(topics),
-            // The topics of px4_msgs and of MAVROS have time stamps of different clocks.
+            // px4_msgs and MAVROS use different clocks for their time stamps, so the topics of only one of them are
+            // used.
             Format::Ros if topics.first("vehicle_attitude").is_some() => px4::rules(topics),
             Format::Ros => mavros::rules(topics, self.mixer()),
             Format::Dataflash => ardupilot::rules(topics, self.mixer()),
@@ -275,7 +277,7 @@ impl Mapping {
         own.chain(turn.clone()).chain(free).collect()
     }
 
-    /// Whether a field of a topic of a ULog or of a ROS bag is needed for any rule. An empty name stands for any field.
+    /// Whether any rule needs a field of a topic of a ULog or a ROS bag. An empty name stands for any field.
     pub(super) fn wants_field(&self, format: Format, topic: &str, field: &str) -> bool {
         if field.is_empty() {
             return self.wants(format, topic);
@@ -290,7 +292,7 @@ impl Mapping {
         own || format == Format::Ros && ros() || entry() || turn()
     }
 
-    /// Whether a topic of a format is needed for any rule.
+    /// Whether any rule needs a topic of a format.
     pub(super) fn wants(&self, format: Format, topic: &str) -> bool {
         let own: &[&str] = match format {
             Format::Csv => &[],
@@ -304,7 +306,7 @@ impl Mapping {
     }
 }
 
-/// The rules for the columns of a table that are named by record or message and field.
+/// The rules for a CSV table whose columns are named by record or message and field, such as `ATT.Roll`.
 pub(super) fn table_rules() -> Vec<Rule> {
     let of_dataflash = ardupilot::rules(&Topics::default(), None);
     of_dataflash.into_iter().chain(telemetry::of_table()).collect()

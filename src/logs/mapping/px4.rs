@@ -1,8 +1,8 @@
-//! PX4's topics as columns.
+//! Rules from PX4's topics to the columns of the table.
 //!
-//! Signs: pitch torque is positive nose up in PX4, elevator positive nose down here. Not mapped:
-//! `actuator_outputs` (pulses whose meaning lies in parameters of the mixer), several motors
-//! (the first counts), and `wind`, which the log format has no column for.
+//! Pitch torque is positive nose up in PX4; elevator is positive nose down here. Of several motors only the first is
+//! used. Not mapped: `actuator_outputs`, whose pulses have a meaning only with parameters of the mixer, and `wind`,
+//! for which the log format has no column.
 
 use super::rule::{Rule, Shape, Term, Tilt};
 use crate::Format;
@@ -102,7 +102,7 @@ pub fn rules(topics: &Topics) -> Vec<Rule> {
     out.push(Rule::linear("air_density_kgpm3", "vehicle_air_data", "rho", 1.0));
     out.push(Rule::linear("roll_target_rad", "vehicle_attitude_setpoint", "roll_body", 1.0));
     out.push(Rule::linear("pitch_target_rad", "vehicle_attitude_setpoint", "pitch_body", 1.0));
-    // Since August 2024 (e008ca24f1) the setpoint has no Euler angles.
+    // Since August 2024 (PX4 commit e008ca24f1) the setpoint has a quaternion instead of Euler angles.
     let q = ["q_d[0]", "q_d[1]", "q_d[2]", "q_d[3]"];
     let setpoint = "vehicle_attitude_setpoint";
     out.push(Rule::tilt("roll_target_rad", setpoint, Tilt::Roll, q));
@@ -114,7 +114,7 @@ pub fn rules(topics: &Topics) -> Vec<Rule> {
 fn commands(topics: &Topics) -> Vec<Rule> {
     let mut out = allocated(topics);
     out.extend(motor(topics));
-    // The three torques, then thrust, of the controller that flies the wings.
+    // The three torques, then the thrust. In a VTOL, instance 1 is the controller of wing-borne flight.
     let kind = vehicle::vehicle(Format::Ulog, topics).map(|v| v.kind);
     let vtol = kind == Some(Kind::Vtol);
     let fixed_wing = if vtol { Some(1) } else { None };
@@ -150,7 +150,7 @@ fn commands(topics: &Topics) -> Vec<Rule> {
     out
 }
 
-/// The first motor, if it runs at any time of the log.
+/// Throttle command from the first motor; `None` if it does not run at any time of the log.
 fn motor(topics: &Topics) -> Option<Rule> {
     let (topic, field) = ("actuator_motors", "control[0]");
     let runs = topics.first(topic)?.field(field)?.iter().any(|x| x.is_finite());

@@ -1,13 +1,13 @@
-//! One way to fill columns from a topic.
+//! Rules that fill columns of the table from the fields of a topic.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use crate::topics::Topic;
 
-/// How a field's value is shaped before it is summed.
+/// Conversion of a field's value before it enters a sum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
-    /// The value without a change.
+    /// The value remains unchanged.
     Linear,
     /// Converts a servo pulse to −1..1, with a separate range on each side of the trim.
     Surface {
@@ -18,7 +18,7 @@ pub enum Shape {
         /// Pulse at 1, µs.
         max: f64,
     },
-    /// The command of a motor of PX4. NaN stops the motor.
+    /// The command of a motor of PX4. NaN, which stops the motor, becomes 0.
     Motor,
     /// Converts a pulse to 0..1.
     Range {
@@ -40,7 +40,7 @@ impl Shape {
                     x
                 }
             }
-            // no servo is driven by a pulse of zero, which stands for none: the safety switch, or an output not set
+            // a pulse of zero means that there is none: the safety switch is on, or the output is not set
             Shape::Surface { .. } if x <= 0.0 => f64::NAN,
             Shape::Surface { min, trim, max } => {
                 let side = if x > trim { max - trim } else { trim - min };
@@ -52,24 +52,26 @@ impl Shape {
     }
 }
 
-/// A field's share in a column.
+/// One term of the sum that fills a column: the converted field times a gain.
 ///
-/// Without a pulse (zero, as of a disarmed vehicle) a motor stands, and the deflection of a servo is unknown.
+/// A pulse of zero means that there is none, as in a disarmed vehicle. A motor then stands still, and the deflection
+/// of a servo is unknown (NaN).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Term {
     /// Name of the field.
     pub field: String,
-    /// Factor after the shape.
+    /// Factor on the converted value.
     pub gain: f64,
-    /// Shape that is applied to the field first.
+    /// Conversion of the field's value.
     pub shape: Shape,
 }
 
 impl Term {
-    /// The share of the field's value `x`.
+    /// The value of the term for the field's value `x`.
     fn of(&self, x: f64) -> f64 {
         match self.shape {
-            // a negative gain is that of reversed pulses or of a difference of motors
+            // a negative gain means reversed pulses or a difference of motors; the value without a pulse is then
+            // unknown
             Shape::Range { .. } if x <= 0.0 => {
                 if self.gain > 0.0 {
                     0.0
@@ -82,7 +84,7 @@ impl Term {
     }
 }
 
-/// Axes between which a quaternion turns.
+/// Axes between which a quaternion rotates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axes {
     /// From body axes forward-right-down to earth axes north-east-down.
@@ -96,13 +98,14 @@ impl Axes {
     fn ned_frd(self, [w, x, y, z]: [f64; 4]) -> [f64; 4] {
         match self {
             Axes::NedFrd => [w, x, y, z],
-            // (0, 1, 1, 0)/√2 from the left turns ENU into NED, (0, 1, 0, 0) from the right FRD into FLU; the sign is changed.
+            // Multiplication by (0, 1, 1, 0)/√2 from the left turns ENU into NED. Multiplication by (0, 1, 0, 0) from
+            // the right turns FRD into FLU. The sign of the product is changed, which leaves the rotation as it is.
             Axes::EnuFlu => [w + z, x + y, x - y, w - z].map(|c| c * FRAC_1_SQRT_2),
         }
     }
 }
 
-/// An angle of a quaternion.
+/// The angle that is computed from a quaternion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tilt {
     /// The roll angle.
@@ -112,7 +115,7 @@ pub enum Tilt {
 }
 
 impl Tilt {
-    /// The angle, rad; NaN if the quaternion is not a rotation.
+    /// The angle, rad; NaN if the norm of the quaternion is far from one.
     fn of(self, [w, x, y, z]: [f64; 4]) -> f64 {
         let norm = (w * w + x * x + y * y + z * z).sqrt();
         if !(0.5..2.0).contains(&norm) {
@@ -133,30 +136,30 @@ pub enum Fill {
     Sum {
         /// Name of the column.
         column: String,
-        /// Fields whose sum fills it.
+        /// Terms whose sum fills the column.
         terms: Vec<Term>,
-        /// Constant that is added.
+        /// Constant that is added, in the column's unit.
         offset: f64,
     },
     /// Roll, pitch and yaw from a quaternion, w first.
     Quaternion {
         /// Fields of the quaternion, w first.
         fields: [String; 4],
-        /// Axes between which it turns.
+        /// Axes between which the quaternion rotates.
         axes: Axes,
     },
     /// One column: the roll or the pitch of a quaternion, w first.
     Tilt {
         /// Name of the column.
         column: &'static str,
-        /// The angle that fills it.
+        /// The angle that fills the column.
         angle: Tilt,
         /// Fields of the quaternion, w first.
         fields: [&'static str; 4],
-        /// Axes between which it turns.
+        /// Axes between which the quaternion rotates.
         axes: Axes,
     },
-    /// Air density from static pressure (times the factor in Pa) and temperature (factor, in °C).
+    /// Air density from static pressure and temperature. The field times its factor is in Pa and in °C.
     Density {
         /// The pressure's field with its factor.
         pressure: (&'static str, f64),
@@ -165,22 +168,22 @@ pub enum Fill {
     },
 }
 
-/// One way to fill columns from a topic.
+/// A rule that fills columns of the table from the fields of a topic.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rule {
     /// Name of the topic.
     pub topic: String,
     /// Instance of the topic; `None` accepts any.
     pub instance: Option<u16>,
-    /// The instance that is usual for the vehicle's type, if it moves.
+    /// The instance to prefer for the vehicle's type if its fields change; `None` for no preference.
     pub preferred: Option<u16>,
-    /// Columns that it fills, and how.
+    /// Columns that the rule fills, and how.
     pub fill: Fill,
     /// Note to the user if this rule is used.
     pub note: Option<String>,
     /// Whether the airspeed is equivalent airspeed, to be converted to true airspeed with the density.
     pub equivalent: bool,
-    /// Whether the user's mapping names it.
+    /// Whether the rule comes from the user's mapping.
     pub own: bool,
 }
 
@@ -200,29 +203,30 @@ impl Rule {
         }
     }
 
-    /// One field times a factor.
+    /// A rule for one field times a factor.
     pub fn linear(column: &str, topic: &str, field: &str, gain: f64) -> Rule {
         let term = Term { field: field.into(), gain, shape: Shape::Linear };
         Rule::sum(column, topic, vec![term])
     }
 
-    /// A sum of terms.
+    /// A rule for a sum of terms.
     pub fn sum(column: &str, topic: &str, terms: Vec<Term>) -> Rule {
         Rule::new(topic, Fill::Sum { column: column.into(), terms, offset: 0.0 })
     }
 
-    /// Roll, pitch and yaw from the four fields of a quaternion NED→FRD.
+    /// A rule for roll, pitch and yaw from the four fields of a quaternion (w first) in the axes [`Axes::NedFrd`].
     pub fn quaternion(topic: &str, fields: [&str; 4]) -> Rule {
         let fields = fields.map(str::to_owned);
         Rule::new(topic, Fill::Quaternion { fields, axes: Axes::NedFrd })
     }
 
-    /// The roll or the pitch of a quaternion's fields.
+    /// A rule for the roll or pitch angle from the four fields of a quaternion (w first) in the axes
+    /// [`Axes::NedFrd`].
     pub fn tilt(column: &'static str, topic: &str, angle: Tilt, fields: [&'static str; 4]) -> Rule {
         Rule::new(topic, Fill::Tilt { column, angle, fields, axes: Axes::NedFrd })
     }
 
-    /// The rule with its quaternion taken between other axes.
+    /// The same rule for a quaternion between other axes.
     pub fn in_axes(mut self, other: Axes) -> Rule {
         if let Fill::Quaternion { axes, .. } | Fill::Tilt { axes, .. } = &mut self.fill {
             *axes = other;
@@ -230,7 +234,8 @@ impl Rule {
         self
     }
 
-    /// Air density from a pressure and a temperature by the gas law.
+    /// A rule for the air density by the gas law. Pressure and temperature are each a field with its factor to Pa or
+    /// °C.
     pub fn density(
         topic: &str,
         pressure: (&'static str, f64),
@@ -252,7 +257,7 @@ impl Rule {
         Rule { instance, ..self }
     }
 
-    /// The rule for one instance if it moves; else for another one that does.
+    /// The same rule with an instance that is preferred if its fields change.
     pub fn preferring(self, preferred: Option<u16>) -> Rule {
         Rule { preferred, ..self }
     }
@@ -262,17 +267,17 @@ impl Rule {
         Rule { note: Some(note.into()), ..self }
     }
 
-    /// The rule with its airspeed taken as equivalent airspeed.
+    /// The same rule for an equivalent airspeed.
     pub fn equivalent(self) -> Rule {
         Rule { equivalent: true, ..self }
     }
 
-    /// The rule as one of the user's mapping.
+    /// The same rule, marked as one of the user's mapping.
     pub fn own(self) -> Rule {
         Rule { own: true, ..self }
     }
 
-    /// The columns that it fills.
+    /// The columns that the rule fills.
     pub fn columns(&self) -> Vec<&str> {
         match &self.fill {
             Fill::Sum { column, .. } => vec![column],
@@ -282,13 +287,13 @@ impl Rule {
         }
     }
 
-    /// The rule, unless its columns are `taken` by others.
+    /// The rule; `None` if one of its columns is `taken` by another rule.
     pub fn without(self, taken: impl Fn(&str) -> bool) -> Option<Rule> {
         let free = !self.columns().iter().any(|c| taken(c));
         free.then_some(self)
     }
 
-    /// The fields that it reads.
+    /// The fields that the rule reads.
     pub fn fields(&self) -> Vec<&str> {
         match &self.fill {
             Fill::Sum { terms, .. } => terms.iter().map(|t| t.field.as_str()).collect(),
@@ -298,12 +303,12 @@ impl Rule {
         }
     }
 
-    /// Where the value comes from, for people.
+    /// Topic and fields of the rule as shown to the user.
     pub fn origin(&self) -> String {
         format!("{}.{}", self.topic, self.fields().join("+"))
     }
 
-    /// Field and factor of a rule that only scales one field.
+    /// Field and factor of the rule, if it only scales one field; else `None`.
     pub fn factor(&self) -> Option<(&str, f64)> {
         match &self.fill {
             Fill::Sum { terms, offset: 0.0, .. } => match &terms[..] {
@@ -314,7 +319,8 @@ impl Rule {
         }
     }
 
-    /// The series that are interpolated, at the topic's own times: one, or a quaternion's four.
+    /// The values before resampling, at the topic's own times: one series, or the four components of a quaternion.
+    /// `None` if the topic lacks a field.
     pub fn series(&self, topic: &Topic) -> Option<Vec<Vec<f64>>> {
         match &self.fill {
             Fill::Sum { terms, offset, .. } => {

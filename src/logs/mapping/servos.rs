@@ -1,4 +1,4 @@
-//! ArduPilot's servo outputs converted back to commands with the SERVOn parameters.
+//! Converts ArduPilot's servo outputs back to commands by the SERVOn parameters.
 
 use super::rule::{Rule, Shape, Term};
 use crate::topics::Topics;
@@ -14,14 +14,15 @@ const THROTTLE: f64 = 70.0;
 const ELEVON_LEFT: f64 = 77.0;
 const ELEVON_RIGHT: f64 = 78.0;
 
-/// The commands behind the pulses of `topic`, whose fields are named `field(n)`, n from 1.
+/// Rules that compute the commands from the servo pulses of `topic`. The field of channel n, from 1, is named
+/// `field(n)`.
 ///
 /// Positive elevator is nose up in ArduPilot, nose down in the log format. Elevons: left =
 /// g (elevator − aileron), right = g (elevator + aileron), g = MIXING_GAIN (0.5).
 ///
-/// Where the airframe's `mixer` assigns the channels, the commands are g⁺ of the pulses. There, a command of one is
-/// the longest pulse, because the airframe describes the servos and not the functions that the flight controller
-/// assigns to them.
+/// If the airframe's `mixer` assigns the channels, its pseudoinverse gives the commands from the pulses. A command of
+/// one is then the longest pulse, because the airframe describes the servos and not the functions that the flight
+/// controller assigns to them.
 pub fn rules(
     topics: &Topics,
     topic: &str,
@@ -51,7 +52,7 @@ pub fn rules(
         ("elevator_cmd", ELEVATOR, -1.0),
         ("rudder_cmd", RUDDER, -1.0),
     ] {
-        // Two servos with the same function move together: the first is used.
+        // Servos with the same function move together, so only the first is used.
         if let Some(n) = channels(function).next() {
             out.push(Rule::sum(column, topic, vec![surface(n, gain)]).noting(note(column)));
         }
@@ -74,7 +75,8 @@ pub fn rules(
     out
 }
 
-/// The commands behind the pulses of all the channels of `mixer`; `None` if it does not name them all.
+/// Rules that compute the commands from the pulses by the `mixer`; `None` if it does not name the channels of all
+/// effectors.
 fn mixed(
     topics: &Topics,
     topic: &str,

@@ -1,8 +1,8 @@
-//! A telemetry log's messages as columns.
+//! Rules from the messages of a telemetry log to the columns of the table.
 //!
-//! States come from the system and component that sends most attitudes, commands from any
-//! component of that system. VFR_HUD is true airspeed from a simulator (profile `sitl`), equivalent
-//! airspeed from ArduPilot or PX4.
+//! States come from the system and component that sends most attitude messages. Commands come from any component of
+//! that system. The airspeed of VFR_HUD is true airspeed if a simulator sends it (profile `sitl`), and equivalent
+//! airspeed if ArduPilot or PX4 does.
 
 use super::rule::Rule;
 use super::servos;
@@ -30,7 +30,7 @@ pub const TOPICS: [&str; 16] = [
     "WIND_COV",
 ];
 
-/// MAV_AUTOPILOT numbers of stacks whose VFR_HUD is not true airspeed.
+/// MAV_AUTOPILOT numbers of ArduPilot and PX4, whose VFR_HUD has equivalent airspeed.
 const EQUIVALENT: [f64; 2] = [3.0, 12.0];
 /// One milli-g in m/s².
 const MILLI_G: f64 = STANDARD_GRAVITY / 1000.0;
@@ -46,7 +46,7 @@ pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
     out.extend(deflections(topics, system));
     out.push(airspeed(topics, system));
     for rule in &mut out {
-        // Another component of the same system may send what the first does not.
+        // If this component does not send a message, another component of the same system may.
         let has = |i: u16| topics.topics.contains_key(&(rule.topic.clone(), i));
         let other =
             topics.instances(&rule.topic).map(|(i, _)| i).find(|i| i.to_be_bytes()[0] == system);
@@ -58,7 +58,7 @@ pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
         ("elevator_cmd", "controls1"),
         ("throttle_cmd", "controls2"),
     ];
-    // A real autopilot sends HIL_ACTUATOR_CONTROLS at most to a simulator, and in another order.
+    // A real autopilot sends HIL_ACTUATOR_CONTROLS to a simulator only, and with another order of channels.
     let real = autopilots(topics, system).any(|a| EQUIVALENT.contains(&a));
     for (column, field) in of_sitl.into_iter().filter(|_| !real) {
         commands.push(
@@ -79,7 +79,7 @@ pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
     out
 }
 
-/// The instance that sends most attitudes, of the system whose flight is read.
+/// The instance with most attitude messages, within the system whose flight is read.
 fn vehicle(topics: &Topics) -> Option<u16> {
     let both = topics.instances("ATTITUDE_QUATERNION").chain(topics.instances("ATTITUDE"));
     let own = both.filter(|(i, _)| topics.system.is_none_or(|s| i.to_be_bytes()[0] == s));
@@ -105,8 +105,8 @@ fn airspeed(topics: &Topics, system: u8) -> Rule {
     }
 }
 
-/// The rules for a table whose columns are named by message and field, such as `ATTITUDE.roll`. The sender is not known:
-/// the airspeed of VFR_HUD is taken as that of a real autopilot, equivalent airspeed.
+/// The rules for a table whose columns are named by message and field, such as `ATTITUDE.roll`. The sender is not
+/// known, so VFR_HUD is taken as that of a real autopilot, with equivalent airspeed.
 pub fn of_table() -> Vec<Rule> {
     let mut out = states();
     out.push(Rule::linear("airspeed_mps", "VFR_HUD", "airspeed", 1.0).equivalent());
@@ -153,8 +153,8 @@ fn states() -> Vec<Rule> {
     out
 }
 
-/// Positions of the actuators in the order of the sitl profile, which sends the travel of the
-/// surfaces where it is not the X8's.
+/// Rules for the actuator positions in the order of the sitl profile. Its simulator sends the travel of the surfaces
+/// if it differs from the X8's.
 fn deflections(topics: &Topics, system: u8) -> Vec<Rule> {
     let [aileron, elevator, rudder] =
         sent_travel(topics, system).unwrap_or([DEFLECTION, DEFLECTION, 0.0]);
@@ -172,7 +172,8 @@ fn deflections(topics: &Topics, system: u8) -> Vec<Rule> {
         .collect()
 }
 
-/// Travel of aileron, elevator and rudder as the vehicle sends it, rad; zero without a rudder.
+/// Travel of aileron, elevator and rudder as the vehicle sends it, rad; the rudder's is zero if there is none. `None`
+/// if the vehicle sends no travel.
 fn sent_travel(topics: &Topics, system: u8) -> Option<[f64; 3]> {
     let (_, topic) = topics
         .instances("ACTUATOR_OUTPUT_STATUS")

@@ -1,4 +1,4 @@
-//! The mapping file as TOML holds it, and the checks of its parts.
+//! The mapping file as it is deserialised from TOML, and the checks of its parts.
 
 use std::collections::BTreeMap;
 
@@ -76,7 +76,7 @@ fn one() -> f64 {
     1.0
 }
 
-/// The least flight that a mapping may ask for, s.
+/// Smallest `flight.shortest_s` that a mapping may set, s.
 const SHORTEST_S: f64 = 0.5;
 
 pub(super) fn thresholds(flight: WrittenFlight) -> Result<WrittenFlight, String> {
@@ -135,7 +135,7 @@ pub(super) fn entry(column: &str, e: WrittenEntry) -> Result<Entry, String> {
     })
 }
 
-/// Refuses a time span (s) over which no slope can be fitted.
+/// Refuses a time span (s) that is too short or too long for the fit of a slope.
 pub(super) fn over(what: &str, time: Option<f64>) -> Result<(), String> {
     match time {
         Some(x) if !(x > 0.0 && x <= 10.0) => {
@@ -145,7 +145,7 @@ pub(super) fn over(what: &str, time: Option<f64>) -> Result<(), String> {
     }
 }
 
-/// `system/component` as an instance.
+/// The instance number of `system/component`; `None` if the text has another form.
 fn source(text: &str) -> Option<u16> {
     let (system, component) = text.split_once('/')?;
     Some(u16::from_be_bytes([system.trim().parse().ok()?, component.trim().parse().ok()?]))

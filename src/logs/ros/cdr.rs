@@ -1,21 +1,21 @@
-//! Numbers of a message in the Common Data Representation of DDS (CDR), of either byte order.
+//! Reads the numbers of a message in the Common Data Representation (CDR) of DDS, in either byte order.
 //!
-//! A message begins with four bytes that name its encoding. A number stands at a multiple of its size behind them, in
-//! the second version of the encoding at a multiple of four at most.
+//! A message begins with four bytes that name its encoding. After them, each number is aligned to a multiple of its
+//! size. In the second version of the encoding the alignment is four bytes at most.
 
 use crate::number::Number;
 
-/// A message that is read from its beginning.
+/// A message, and the position up to which it is read.
 pub(super) struct Cdr<'b> {
     body: &'b [u8],
     at: usize,
     little: bool,
-    /// The widest alignment.
+    /// The widest alignment, bytes.
     widest: usize,
 }
 
 impl<'b> Cdr<'b> {
-    /// The content of a message; `None` in another encoding than plain CDR.
+    /// Begins to read a message; `None` if its encoding is not plain CDR.
     pub fn of(message: &'b [u8]) -> Option<Cdr<'b>> {
         let (head, body) = message.split_at_checked(4)?;
         let (little, widest) = match head {
@@ -42,7 +42,7 @@ impl<'b> Cdr<'b> {
         Some(bytes)
     }
 
-    /// The next number.
+    /// The next number; `None` if the message ends before it.
     pub fn number(&mut self, kind: Number) -> Option<f64> {
         let bytes = self.take(kind.size(), 1)?;
         if self.little {
@@ -60,7 +60,7 @@ impl<'b> Cdr<'b> {
         self.number(Number::U32).map(|length| length as usize)
     }
 
-    /// Passes over `count` numbers.
+    /// Skips `count` numbers.
     pub fn pass(&mut self, kind: Number, count: usize) -> Option<()> {
         match count {
             // An empty sequence is not aligned.
@@ -69,7 +69,7 @@ impl<'b> Cdr<'b> {
         }
     }
 
-    /// Passes over a string.
+    /// Skips a string.
     pub fn pass_text(&mut self) -> Option<()> {
         let length = self.length()?;
         self.take(1, length).map(|_| ())

@@ -1,4 +1,5 @@
-//! Chunks of an MCAP file: unpacked while they are read, their checksum compared at their end.
+//! Reads the chunks of an MCAP file. They are unpacked while they are read, and their checksum is compared at the
+//! end.
 
 use std::io::{self, Read};
 
@@ -9,21 +10,21 @@ use super::records::bytes;
 use super::{LOOK, Reader};
 use crate::window::Window;
 
-/// Times, sizes and checksum before the name of the compression.
+/// Number of bytes (times, size, checksum) before the name of the compression.
 const TO_NAME: usize = 28;
-/// The longest name of a compression.
+/// Length of the longest name of a compression, bytes.
 const NAME: usize = 16;
-/// The largest window of a zstd frame, bytes: the most that a compressor takes below its level 20.
+/// The largest accepted window of a zstd frame, bytes. Compressors need a larger one only from level 20 on.
 const ZSTD_WINDOW: u64 = 8 << 20;
 
-/// The bytes of a record's body that are still to come.
+/// The unread rest of a record's body.
 pub(super) struct Body<'b, 'w> {
     pub window: &'b mut Window<'w>,
     pub left: u64,
 }
 
 impl Body<'_, '_> {
-    /// Passes over what is left; returns the number of bytes that the file lacks of it.
+    /// Skips the rest. Returns the number of its bytes that the file lacks.
     pub fn finish(mut self) -> u64 {
         let _ = io::copy(&mut self, &mut io::sink());
         self.left
@@ -45,7 +46,7 @@ impl Read for Body<'_, '_> {
     }
 }
 
-/// Whether the header of a chunk of `length` bytes agrees with that length, as far as `body` holds it.
+/// Whether the header of a chunk agrees with the length of its record. `body` may hold only a part of the header.
 pub(super) fn agrees(body: &[u8], length: u64) -> bool {
     let Some(name) = bytes(body, TO_NAME).map(|b| u32::from_le_bytes(b) as usize) else {
         return length > (TO_NAME + 12) as u64;
@@ -55,7 +56,7 @@ pub(super) fn agrees(body: &[u8], length: u64) -> bool {
     name <= NAME && size.is_none_or(|size| size.checked_add(head) == Some(length))
 }
 
-/// A source with the checksum of what was read of it.
+/// A source that computes the checksum of the bytes that are read.
 struct Summed<R> {
     source: R,
     sum: crc32fast::Hasher,
@@ -106,16 +107,16 @@ impl Reader<'_> {
     }
 }
 
-/// What the header of a chunk says of its content.
+/// The header of a chunk.
 struct Header {
     uncompressed_size: u64,
-    /// Zero if there is none.
+    /// Checksum of the unpacked content; zero if there is none.
     uncompressed_crc: u32,
     compression: String,
     compressed_size: u64,
 }
 
-/// The header of a chunk, of whose compression's name no more than [`NAME`] bytes are read.
+/// Reads the header of a chunk. At most [`NAME`] bytes of the compression's name are read.
 fn header(body: &mut Body<'_, '_>) -> io::Result<Header> {
     let view = body.window.view(LOOK);
     let name = bytes(view, TO_NAME).map_or(0, |b| u32::from_le_bytes(b) as usize).min(NAME);

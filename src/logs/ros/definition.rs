@@ -1,25 +1,26 @@
-//! Fields of a ROS 2 message by its definition, and their values in a message serialised as CDR.
+//! Finds the fields of a ROS 2 message by its definition, and reads their values from a message in CDR.
 //!
-//! Written here because the crate looked at (`re_ros_msg` 0.36.3) refuses a whole definition for one constant whose name is
-//! not in capitals, and makes a map of all fields for each message. Here only the fields that are asked for are read; what
-//! follows the last of them is not looked at.
+//! The crate `re_ros_msg` (0.36.3) is not used. It refuses a whole definition for one constant whose name is not in
+//! capitals, and it makes a map of all fields for each message. Here only the requested fields are read. The rest of
+//! a message after the last of them is not read.
 //!
-//! Not read: strings, `wstring` and what follows one, elements of sequences of messages.
+//! Not read: strings, elements of sequences of messages, and every message type that contains a `wstring`.
 
 use std::collections::BTreeMap;
 
 use super::cdr::Cdr;
 use crate::number::Number;
 
-/// Nesting of message types; those of MAVROS and PX4 have five levels at most.
+/// Largest nesting of message types that is followed; those of MAVROS and PX4 have five levels at most.
 const DEPTH: usize = 8;
-/// Steps and elements of all messages of a bag that are read; `nav_msgs/Odometry` has a hundred.
+/// Largest number of reading steps and array elements for all message types of a bag. `nav_msgs/Odometry` has about a
+/// hundred.
 pub(super) const STEPS: usize = 1 << 16;
-/// Fields of a message that are read.
+/// Largest number of fields of a message that are read.
 const FIELDS: usize = 256;
-/// Elements of an array that can be fields.
+/// Largest number of elements of an array that are read as fields.
 const ELEMENTS: usize = 32;
-/// Fields of which the time of a message is made. They are the first values of a message.
+/// Fields that give the time of a message. Their values come first in a decoded message.
 pub(super) const STAMPS: [&str; 4] =
     ["header.stamp.sec", "header.stamp.nanosec", "timestamp", "timestamp_sample"];
 
@@ -27,20 +28,20 @@ pub(super) const STAMPS: [&str; 4] =
 #[derive(Clone, Copy, Debug)]
 enum Count {
     Fixed(usize),
-    /// As many as the message says.
+    /// A number that the message states.
     Sequence,
 }
 
 /// One step of reading a message.
 #[derive(Debug)]
 enum Step {
-    /// A number, with the place of its value.
+    /// A number, with the index of its value if it is requested.
     Number(Number, Option<usize>),
-    /// A string, which is passed over.
+    /// A string, which is skipped.
     Text,
-    /// An array of numbers, with the places of the values of its first elements.
+    /// An array of numbers, with the indices of the values of its first elements.
     Numbers(Number, Count, Vec<Option<usize>>),
-    /// An array of strings or messages, which is passed over.
+    /// An array of strings or messages, which is skipped.
     Each(Count, Vec<Step>),
 }
 
@@ -58,7 +59,7 @@ impl Step {
 /// The fields of a type: type and name of each.
 type Fields<'t> = Vec<(&'t str, &'t str)>;
 
-/// How the fields of a message that are asked for are read.
+/// The steps by which the requested fields of a message type are read.
 #[derive(Debug)]
 pub(super) struct Plan {
     steps: Vec<Step>,
@@ -67,8 +68,9 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    /// The plan for the type `name` (`package/msg/Type`) by the definitions in `text`, for the fields that `wanted`
-    /// names; `None` if the definition cannot be followed, or takes more than the `budget` of steps that is left.
+    /// Makes the plan for the type `name` (`package/msg/Type`) from the definitions in `text`. It reads the fields
+    /// for which `wanted` is true. `None` if a definition is missing, or if the plan needs more steps than are left
+    /// in `budget`.
     pub fn of(
         name: &str,
         text: &str,
@@ -84,8 +86,8 @@ impl Plan {
         Some(Plan { steps, fields: maker.fields })
     }
 
-    /// Reads a message into `values`: [`STAMPS`], then the fields, NaN where there is none. `false` if it does not fit
-    /// the definition.
+    /// Reads a message into `values`: [`STAMPS`], then the fields; NaN if a value is absent. Returns `false` if the
+    /// message does not fit the definition.
     pub fn decode(&self, message: &[u8], values: &mut Vec<f64>) -> bool {
         values.clear();
         values.resize(STAMPS.len() + self.fields.len(), f64::NAN);
@@ -118,7 +120,7 @@ fn run(steps: &[Step], cdr: &mut Cdr<'_>, values: &mut [f64]) -> Option<()> {
                 for _ in 0..counted(*count, cdr)? {
                     let before = cdr.left();
                     run(steps, cdr, values)?;
-                    // A message of empty arrays takes no bytes, however many there are.
+                    // Elements without any bytes need not be read one by one, however many the message states.
                     if cdr.left() == before {
                         break;
                     }
@@ -146,16 +148,16 @@ struct Maker<'m> {
 }
 
 impl Maker<'_> {
-    /// Takes `steps` off the budget; `None` if it does not hold as many.
+    /// Takes `steps` off the budget; `None` if it is too small.
     fn spend(&mut self, steps: usize) -> Option<()> {
         *self.budget = self.budget.checked_sub(steps)?;
         Some(())
     }
 
-    /// The place of the value of a field, if it is asked for.
+    /// Index of the value of a field; `None` if the field is not requested.
     fn place(&mut self, name: &str) -> Option<usize> {
         if let Some(stamp) = STAMPS.iter().position(|stamp| *stamp == name) {
-            // The stamp itself may be asked for as well; it is one field in either case.
+            // A stamp is read in any case and has a fixed index.
             return Some(stamp);
         }
         let fits = self.fields.len() < FIELDS && (self.wanted)(name);
@@ -165,8 +167,8 @@ impl Maker<'_> {
         })
     }
 
-    /// The steps of a message of type `name`. Its fields are called `prefix` and their name; without a prefix they are
-    /// passed over.
+    /// Appends the steps for a message of type `name` to `out`. `prefix` precedes the names of its fields. Without a
+    /// prefix the fields are skipped.
     fn message(
         &mut self,
         name: &str,
@@ -195,7 +197,7 @@ impl Maker<'_> {
         Some(())
     }
 
-    /// The step of a field of the type `kind`, as it is written in a message of `package`.
+    /// Appends the step for a field to `out`. `kind` is its type as it is written in a message of `package`.
     fn field(
         &mut self,
         kind: &str,
@@ -239,7 +241,7 @@ impl Maker<'_> {
 /// The fields of `builtin_interfaces/Time` and `Duration`, which some writers leave out.
 const TIME: [(&str, &str); 2] = [("int32", "sec"), ("uint32", "nanosec")];
 
-/// Type of the elements and their number, of an array; the type itself of what is none.
+/// Element type and number of elements of an array type. Another type is returned as it is, without a number.
 fn array(kind: &str) -> Option<(&str, Option<Count>)> {
     let Some((element, count)) = kind.split_once('[') else { return Some((kind, None)) };
     let count = count.strip_suffix(']')?;
@@ -253,7 +255,7 @@ fn is_text(kind: &str) -> bool {
     kind.split("<=").next() == Some("string")
 }
 
-/// `package/Type` of a type as it is written in a message of `package`.
+/// The full name `package/Type` of a type, as it is written in a message of `package`.
 fn full(kind: &str, package: &str) -> String {
     match kind {
         "Header" => "std_msgs/Header".to_owned(),
@@ -262,7 +264,7 @@ fn full(kind: &str, package: &str) -> String {
     }
 }
 
-/// `package/Type` of `package/msg/Type`.
+/// The name `package/Type` from `package/msg/Type`.
 fn short(name: &str) -> String {
     match (name.split('/').next(), name.rsplit_once('/')) {
         (Some(package), Some((_, kind))) => format!("{package}/{kind}"),
@@ -270,7 +272,7 @@ fn short(name: &str) -> String {
     }
 }
 
-/// The types that a definition holds: `name`, then those behind lines of `=` and `MSG: package/Type`.
+/// The types in a definition: `name`, then those after lines of `=` and `MSG: package/Type`.
 fn types<'t>(name: &str, text: &'t str) -> BTreeMap<String, Fields<'t>> {
     let mut types: BTreeMap<String, Fields<'t>> = BTreeMap::new();
     let mut current = short(name);
@@ -286,7 +288,7 @@ fn types<'t>(name: &str, text: &'t str) -> BTreeMap<String, Fields<'t>> {
     types
 }
 
-/// Type and name of the field that a line declares; `None` of a constant, a comment or a separator.
+/// Type and name of the field that a line declares; `None` for a constant, a comment or a separator.
 fn field(line: &str) -> Option<(&str, &str)> {
     let line = line.split('#').next()?.trim();
     let (kind, rest) = line.split_once(char::is_whitespace)?;
@@ -304,7 +306,7 @@ mod tests {
         uint16[<=4] pulses\nstring<=8 name \"a # b\"\nbool last 1\n================\nMSG: std_msgs/Header\n\
         builtin_interfaces/Time stamp\nstring frame_id\n================\nMSG: own/Inner\nint8 a\nfloat32 b\n";
 
-    /// A message of `TEXT`, written by hand: little-endian, then big-endian.
+    /// A message of the type in `TEXT`, encoded by hand in little-endian or big-endian order.
     fn message(little: bool) -> Vec<u8> {
         let mut out = vec![0, u8::from(little), 0, 0];
         let order = |bytes: &[u8]| -> Vec<u8> {
@@ -360,7 +362,7 @@ mod tests {
             );
             assert!(of("pulses[2]").is_nan());
         }
-        // Cut anywhere, it does not fit.
+        // A message that is cut anywhere does not fit its definition.
         let whole = message(true);
         assert!((0..whole.len()).all(|end| !plan.decode(&whole[..end], &mut values)));
     }
@@ -382,7 +384,7 @@ mod tests {
             )
             .is_none()
         );
-        // Four thousand million empty messages are no work.
+        // Four thousand million empty elements take no time.
         let plan = Plan::of(
             "own/msg/A",
             "E[] e\nint8 x\n===\nMSG: own/E\nint8[0] n\n",

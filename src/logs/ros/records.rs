@@ -1,7 +1,7 @@
-//! The records of an MCAP file that declare a bag's topics, and the codes of all records.
+//! Records of an MCAP file that declare topics, and the codes of the records.
 //!
-//! Not by the crate `mcap` (0.26.0): its readers hold the largest record in memory, a camera's image for example, and end at
-//! the first damage.
+//! The crate `mcap` (0.26.0) is not used. Its readers hold the largest record in memory, such as a camera image, and
+//! stop at the first damage.
 
 /// Codes of the records, by <https://mcap.dev/spec>.
 pub(super) mod op {
@@ -26,7 +26,7 @@ pub(super) struct Schema {
     pub text: String,
 }
 
-/// The declaration of a channel, on which messages of a topic stand.
+/// The declaration of a channel, which carries messages of one topic.
 pub(super) struct Channel {
     pub id: u16,
     pub schema: u16,
@@ -35,7 +35,7 @@ pub(super) struct Channel {
     pub encoding: String,
 }
 
-/// The first `N` bytes of `view` from `at` on.
+/// The `N` bytes of `view` from the index `at` on; `None` if there are fewer.
 pub(super) fn bytes<const N: usize>(view: &[u8], at: usize) -> Option<[u8; N]> {
     view.get(at..)?.first_chunk().copied()
 }

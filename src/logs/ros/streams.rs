@@ -1,4 +1,4 @@
-//! The topics of a bag, each with the plan by which its messages are read, and the vehicles that they belong to.
+//! The topics of a bag: how their messages are read, and to which vehicle each topic belongs.
 
 use std::collections::BTreeMap;
 
@@ -9,9 +9,10 @@ use crate::finding::Finding;
 use crate::stretches::Keep;
 use crate::topics::{Topic, Topics};
 
-/// Stamps later than this, s, count from 1970; earlier ones from the boot of the vehicle or the start of a simulation.
+/// Stamps later than this, s, count from 1970. Earlier ones count from the boot of the vehicle or the start of a
+/// simulation.
 const SINCE_1970_S: f64 = 1e8;
-/// Number of attitudes from which a further namespace counts as another vehicle.
+/// Number of attitude messages from which a further namespace counts as another vehicle.
 const VEHICLE: usize = 10;
 /// Topics with an attitude, by which vehicles are counted.
 const ATTITUDES: [&str; 2] = ["vehicle_attitude", "imu/data"];
@@ -23,34 +24,34 @@ const PX4: &str = "px4_msgs/";
 struct Stream {
     /// Namespace of the vehicle; empty for the only one.
     vehicle: String,
-    /// Name in the table of topics.
+    /// Name of the topic in rules and mappings.
     name: String,
     /// Whether its messages are of `px4_msgs`, whose `timestamp` is in microseconds.
     px4: bool,
     count: usize,
-    /// How its messages are read; `None` of a topic that is not asked for.
+    /// How its messages are read; `None` if the topic is not requested.
     plan: Option<Plan>,
     topic: Option<Topic>,
-    /// Messages that do not fit the definition, or are longer than any that is read.
+    /// Number of messages that do not fit the definition or are too long.
     unfit: usize,
-    /// Why its messages cannot be read, though they are asked for.
+    /// Why its requested messages cannot be read; `None` if they can.
     unread: Option<String>,
 }
 
-/// The clock of the stamps beside that of the recorder.
+/// Relation of the clock of the stamps to the clock of the recorder.
 #[derive(Default)]
 struct Clock {
     /// The second from which its times are counted; zero for a clock that begins at a boot.
     epoch_s: Option<f64>,
-    /// Recorder's time less the message's, s.
+    /// Recorder's time minus the message's time, s.
     offset_s: Option<f64>,
-    /// What is added to the stamps, s.
+    /// Correction that is added to the stamps, s.
     shift_s: f64,
     jumps: usize,
 }
 
 impl Clock {
-    /// The time of a message by its stamp and by the recorder, s.
+    /// The time of a message, s, from its stamp and the recorder's time (s). Jumps of the stamps are removed.
     fn time(&mut self, stamp_s: f64, log_s: f64) -> f64 {
         let time = stamp_s + self.shift_s;
         let offset = log_s - time;
@@ -78,12 +79,12 @@ pub(super) struct Streams<'w> {
     /// The stream of each topic, by its full name.
     by_topic: BTreeMap<String, usize>,
     streams: Vec<Stream>,
-    /// Of `header.stamp` and of `timestamp`.
+    /// The clocks of `header.stamp` and of `timestamp`.
     clocks: [Clock; 2],
-    /// Second of the first message by the recorder, from which its times are counted.
+    /// Whole second of the first message on the recorder's clock. The recorder's times count from it.
     log_epoch_s: Option<u64>,
     values: Vec<f64>,
-    /// Steps that plans may still take: what a file declares must not take more memory than it has bytes.
+    /// Number of reading steps that plans may still have. The limit keeps a damaged file from using much memory.
     budget: usize,
     /// Messages on channels that the file does not declare.
     orphans: usize,
@@ -92,7 +93,7 @@ pub(super) struct Streams<'w> {
 }
 
 impl<'w> Streams<'w> {
-    /// No topics yet. The fields for which `wanted(topic, field)` is true are read.
+    /// Makes an empty collection. The fields for which `wanted(topic, field)` is true are read.
     pub fn new(wanted: &'w dyn Fn(&str, &str) -> bool, keep: Keep) -> Streams<'w> {
         Streams {
             wanted,
@@ -118,7 +119,7 @@ impl<'w> Streams<'w> {
         }
     }
 
-    /// Takes the declaration of a channel. One that repeats a topic joins its stream.
+    /// Takes the declaration of a channel. A second channel of a topic joins the stream of the first.
     pub fn declare(&mut self, channel: Option<Channel>) {
         let Some(channel) = channel else {
             self.unreadable += 1;
@@ -133,7 +134,7 @@ impl<'w> Streams<'w> {
         let (px4, (vehicle, name)) = (kind.starts_with(PX4), named(&channel.topic, kind));
         let wanted = |field: &str| (self.wanted)(&name, field);
         let encoding = &channel.encoding;
-        // Only a topic of which a field may be asked for is worth a plan.
+        // A plan is made only for a topic with fields that may be requested.
         let (plan, unread) =
             match wanted(ANY).then(|| planned(schema, encoding, &wanted, &mut self.budget)) {
                 None => (None, None),
@@ -152,7 +153,7 @@ impl<'w> Streams<'w> {
         self.channels.contains_key(&channel)
     }
 
-    /// Counts a message. Returns whether it is to be read. A message that is not `short` enough is not.
+    /// Counts a message. Returns whether it is to be read. A message that is too long (not `short`) is only counted.
     pub fn counts(&mut self, channel: u16, short: bool) -> bool {
         let stream = self.channels.get(&channel).and_then(|i| self.streams.get_mut(*i));
         let Some(stream) = stream else {
@@ -173,7 +174,7 @@ impl<'w> Streams<'w> {
             stream.unfit += 1;
             return;
         }
-        // A second as base, so that differences of times are exact to a nanosecond.
+        // Times count from a whole second, so that their differences are exact to a nanosecond.
         let base = *self.log_epoch_s.get_or_insert(log_ns / 1_000_000_000);
         let log_s = (i128::from(log_ns) - i128::from(base) * 1_000_000_000) as f64 * 1e-9;
         let [sec, nanosec, timestamp, sampled] = [0, 1, 2, 3].map(|i| self.values[i]);
@@ -216,7 +217,7 @@ impl<'w> Streams<'w> {
         vehicles.into_iter().map(one).collect()
     }
 
-    /// What was left out of the bag, and what is odd about the times.
+    /// Texts about messages that were left out, and about jumps of the stamps.
     fn said(&self) -> Vec<String> {
         let mut said = Vec::new();
         if self.orphans + self.unreadable > 0 {
@@ -242,7 +243,7 @@ fn attitudes(streams: &[Stream]) -> usize {
 }
 
 impl Stream {
-    /// What was left out of the topic.
+    /// Text about messages of the topic that were left out; `None` if there are none.
     fn said(&self) -> Option<String> {
         let (count, name) = (self.count, &self.name);
         match &self.unread {
@@ -257,10 +258,11 @@ impl Stream {
     }
 }
 
-/// Name that stands for any field of a topic.
+/// Name of a field that stands for any field of a topic.
 pub(super) const ANY: &str = "";
 
-/// The plan of a channel's messages; `None` if it has no definition.
+/// The plan for a channel's messages; `None` if it has no definition. The error is the reason why they cannot be
+/// read.
 fn planned(
     schema: Option<&Schema>,
     encoding: &str,
@@ -278,7 +280,8 @@ fn planned(
     plan.map(Some).ok_or_else(|| format!("the definition of {} is not whole", schema.name))
 }
 
-/// Namespace of the vehicle, and name in the table of topics, of a topic of the message type `kind`.
+/// Splits the full name `topic` into the namespace of the vehicle and the name in rules and mappings. `kind` is the
+/// type of its messages.
 fn named(topic: &str, kind: &str) -> (String, String) {
     let topic = topic.trim_start_matches('/');
     if kind.starts_with(PX4) {
@@ -300,7 +303,7 @@ fn named(topic: &str, kind: &str) -> (String, String) {
     }
 }
 
-/// The topics of a flight. Topics of one name are instances of it, in the order of the file.
+/// The topics of a flight. Topics with the same name become its instances, in the order of the file.
 fn topics(streams: Vec<Stream>, findings: Vec<Finding>, life: Option<String>) -> Topics {
     let mut out = Topics { life, findings, ..Topics::default() };
     out.findings.extend(streams.iter().filter_map(Stream::said).map(Finding::warning));

@@ -1,4 +1,4 @@
-//! Bags written by `tests/data/ros/make.py`: what is read of them beside the flight that they were made of.
+//! Compares bags that `tests/data/ros/make.py` wrote with the flight from which it made them.
 
 use std::path::{Path, PathBuf};
 
@@ -25,12 +25,12 @@ fn said(log: &Log) -> String {
     log.findings.iter().map(|f| format!("{f}\n")).collect()
 }
 
-/// The first rows of a log, in which an absent value is one like another.
+/// The first rows of a log as text, so that two missing values are equal.
 fn table(log: &Log, rows: usize) -> String {
     log.flight.samples[..rows].iter().map(|s| format!("{s:?}\n")).collect()
 }
 
-/// The largest difference from the truth: of the airspeed, and of all else.
+/// The largest differences from the true flight: of the airspeed, then of all other columns.
 fn differences(log: &Log, truth: &[Sample]) -> [f64; 2] {
     let start = log.flight.samples[0].time_s - truth[0].time_s;
     let mut worst = [0.0_f64; 2];
@@ -73,10 +73,10 @@ fn a_bag_of_px4_msgs_is_the_flight_that_it_was_made_of() {
     );
     assert_eq!(log.vehicle.as_ref().map(|v| v.kind), Some(Kind::FixedWing));
     assert!(log.findings.iter().all(|f| f.severity == Severity::Note), "{}", said(&log));
-    // Single precision of 25 m/s and of 6 hundred metres.
+    // The limit is single precision at 25 m/s, and at 600 m times 0.01.
     let [airspeed, others] = differences(&log, &truth);
     assert!(airspeed < 2e-6 && others < 2e-6, "{airspeed} {others}");
-    // An image that fills several chunks is counted and passed over.
+    // An image that fills several chunks is counted and skipped.
     let counted = |name: &str| log.topics.iter().find(|t| t.0 == name).map(|t| t.2);
     assert_eq!(counted("camera/image_raw"), Some(4));
     assert_eq!(counted("vehicle_status"), Some(200));
@@ -160,7 +160,7 @@ fn damage_costs_a_chunk_and_is_counted() {
         let whole = bag(name);
         let sound = damaged(&whole);
         let mut noticed = 0;
-        // The definitions are in the first chunk only: where they are lost, so are their topics.
+        // Only the first chunk has the definitions. Without them no topic could be read, so it stays undamaged.
         for tenths in 2..8 {
             let at = whole.len() * tenths / 10;
             let mut spoiled = whole.clone();
@@ -171,7 +171,7 @@ fn damage_costs_a_chunk_and_is_counted() {
                 let log = damaged(&bytes);
                 let text = said(&log);
                 noticed += usize::from(warned(&text));
-                // The index of a chunk is not needed.
+                // Damage to the index of a chunk has no effect, because it is not needed.
                 let same =
                     log.flight.samples.len() == 200 && table(&log, 200) == table(&sound, 200);
                 assert!(warned(&text) || same, "{name} at {at}: {text}");
@@ -180,7 +180,7 @@ fn damage_costs_a_chunk_and_is_counted() {
         }
         assert!(noticed > 7, "{name}: {noticed}");
     }
-    // What is left is right.
+    // The remaining messages are correct.
     let mut bytes = bag("px4.zstd.mcap");
     bytes[25_000] ^= 0x40;
     let log = damaged(&bytes);
@@ -194,7 +194,7 @@ fn damage_costs_a_chunk_and_is_counted() {
 
 #[test]
 fn a_bag_without_flight_topics_says_what_it_holds() {
-    // The first chunk alone is the beginning of a log; its header alone is none.
+    // The first 40 bytes of the file declare no topic.
     let empty = &bag("px4.zstd.mcap")[..40];
     let error = parse(empty, Path::new("e.mcap"), &Options::default()).unwrap_err();
     assert!(matches!(error, LogError::Missing { .. }), "{error}");

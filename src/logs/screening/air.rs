@@ -1,4 +1,4 @@
-//! Airspeed, vanes, climb and density: units and signs.
+//! Checks of airspeed, vanes, climb and density: units and signs.
 
 use super::cured;
 use super::relation::{
@@ -8,23 +8,24 @@ use crate::Sample;
 use crate::finding::Finding;
 use greylag_physics::atmosphere::{STANDARD_GRAVITY, standard_density};
 
-/// Units of speed other than m/s: name, m/s in one.
+/// Units of speed other than m/s: name, and size in m/s.
 const SPEEDS: [(&str, f64); 3] = [("km/h", 1.0 / 3.6), ("knots", 0.514_444), ("ft/s", 0.3048)];
 /// Metres in a foot.
 const FOOT: f64 = 0.3048;
-/// Window over which a climb is compared, s.
+/// Window over which altitude and climb are compared, s.
 const CLIMB_S: f64 = 2.0;
-/// Interquartile range of the ratios to the ground speed, relative to their median, above which they show wind.
+/// Largest interquartile range, relative to the median, of the ratios of airspeed to ground speed. A larger range
+/// shows wind.
 const GROUND_SPREAD: f64 = 0.25;
-/// The same for the ratios in turns; a larger range comes from manoeuvres.
+/// The same limit for the ratios in turns, where a larger range comes from manoeuvres.
 const TURN_SPREAD: f64 = 0.5;
 /// Correlation above which a relation is taken as certain.
 const CERTAIN: f64 = 0.8;
-/// Angle of attack that no aircraft exceeds for a twentieth of the time, rad.
+/// The column of a vane is in degrees if more than 5 % of its values exceed this, rad.
 const VANE_LARGE: f64 = 1.0;
 
-/// Checks of airspeed, vanes, climb and density. Vanes turn freely on the ground, so that they are checked on the
-/// rows `flown` only.
+/// Checks of airspeed, vanes, climb and density. Vanes turn freely on the ground, so they are checked in the rows
+/// `flown` only.
 pub fn check(rows: &[Sample], flown: &[Sample]) -> Vec<Finding> {
     let airspeed = airspeed(rows);
     let speed_is_right = airspeed.is_none();
@@ -34,8 +35,8 @@ pub fn check(rows: &[Sample], flown: &[Sample]) -> Vec<Finding> {
     out
 }
 
-/// Steady turns give the airspeed without wind, V = g tan φ / ψ̇; the velocity over ground gives it where
-/// the wind is weak.
+/// Checks the unit of the airspeed. Steady turns give the airspeed without wind, V = g tan φ / ψ̇. The velocity over
+/// ground gives it if the wind is weak.
 fn airspeed(rows: &[Sample]) -> Option<Finding> {
     let by_turns = steady(&values(rows, by_turn), TURN_SPREAD);
     let ground = values(rows, |s| {
@@ -46,13 +47,13 @@ fn airspeed(rows: &[Sample]) -> Option<Finding> {
         .or_else(|| other_unit(steady(&ground, GROUND_SPREAD), "the velocity over ground shows"))
 }
 
-/// The median, if the middle half of the values is close together.
+/// The median of `ratios`; `None` if their interquartile range exceeds `spread` times the median.
 fn steady(ratios: &[f64], spread: f64) -> Option<f64> {
     let [low, middle, high] = [0.25, 0.5, 0.75].map(|q| quantile(ratios, q));
     middle.filter(|m| high.zip(low).is_some_and(|(high, low)| high - low < spread * m))
 }
 
-/// Ratio of the airspeed to that computed from a steady turn; NaN outside of turns.
+/// Ratio of the logged airspeed to the airspeed computed from a steady turn; NaN outside of turns.
 fn by_turn(s: &Sample) -> f64 {
     let [roll, pitch, _] = s.attitude_rad;
     let turn = (s.rates_radps[1] * roll.sin() + s.rates_radps[2] * roll.cos()) / pitch.cos();
@@ -94,7 +95,8 @@ fn vanes(rows: &[Sample]) -> Vec<Finding> {
         .collect()
 }
 
-/// Altitude against the climb that velocity over ground, or airspeed and pitch, integrate to.
+/// Compares the altitude with the integral of the climb rate, from the velocity over ground, or from airspeed and
+/// pitch.
 fn climb(rows: &[Sample], speed_is_right: bool) -> Option<Finding> {
     let windows = windows(rows, CLIMB_S);
     let height = |w: &&[Sample]| change(w, |s| s.altitude_m);
@@ -131,7 +133,7 @@ fn climb(rows: &[Sample], speed_is_right: bool) -> Option<Finding> {
     density(rows)
 }
 
-/// A logged density against the standard atmosphere at the logged altitude.
+/// Compares a logged density with the standard atmosphere at the logged altitude.
 fn density(rows: &[Sample]) -> Option<Finding> {
     let ratio = |foot: f64| {
         quantile(

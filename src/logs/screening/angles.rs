@@ -1,4 +1,4 @@
-//! Attitude against body rates: units and signs.
+//! Checks of the attitude against the body rates: units and signs.
 
 use std::f64::consts::{PI, TAU};
 
@@ -15,11 +15,12 @@ const WINDOW_S: f64 = 0.5;
 /// Correlation above which a relation between an angle and a rate is taken as certain.
 const CERTAIN: f64 = 0.8;
 
-/// Largest pitch angle at which the roll rate is close enough to p to compare their scales, rad.
+/// Largest pitch angle at which φ̇ is close enough to p for a comparison of their scales, rad.
 const GENTLE: f64 = 0.5;
 
-/// Checks the units, then the signs. Signs are checked only if the units are right, because their equations contain sines
-/// of the angles. The scale of roll against p is checked in flight only: on the ground both are noise.
+/// Checks the units, then the signs. Signs are checked only if the units are right, because their equations contain
+/// sines of the angles. The scale of roll relative to p is checked in flight only, because on the ground both are
+/// noise.
 pub fn check(rows: &[Sample], flies: bool) -> Vec<Finding> {
     let windows = windows(rows, WINDOW_S);
     let units = units(rows, &windows);

@@ -1,4 +1,4 @@
-//! The clock: seconds, milliseconds or microseconds.
+//! Check of the clock: seconds, milliseconds, microseconds or nanoseconds.
 
 use super::cured;
 use super::relation::{near, quantile, through_origin, values};
@@ -7,10 +7,11 @@ use crate::finding::Finding;
 
 /// Median time between rows above which the clock is checked, s. A log of 1 Hz is unusable anyway.
 const SUSPICIOUS_S: f64 = 0.9;
-/// Rows over which a turn is compared with the rates.
+/// Number of rows over which the change of roll is compared with the integral of the roll rate.
 const SPAN: usize = 20;
 
-/// Compares the change of the roll angle with the integral of the roll rate over the clock.
+/// Compares the change of the roll angle with the integral of the roll rate over the logged time. Returns a finding
+/// if the time is not in seconds.
 pub fn check(rows: &[Sample]) -> Option<Finding> {
     let times = values(rows, |s| s.time_s);
     let periods: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).filter(|p| *p > 0.0).collect();

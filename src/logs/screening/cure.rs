@@ -4,16 +4,16 @@ use crate::Sample;
 use crate::columns::{COLUMNS, index};
 use crate::finding::{Cure, Finding};
 
-/// Columns that the same correction applies to, by the first of them.
+/// Groups of columns to which one correction applies. A finding names the first column of a group.
 const LIKEWISE: [&[&str]; 3] = [
     &["roll_rad", "pitch_rad", "yaw_rad"],
     &["p_radps", "q_radps", "r_radps"],
     &["ax_mps2", "ay_mps2", "az_mps2"],
 ];
-/// Text between the problem and its cure.
+/// Text between the problem and its correction.
 const BETWEEN: &str = ": ";
 
-/// The findings without ineffective cures: those after which the check finds the same column wrong again.
+/// Removes ineffective corrections from `findings`: those after which `check` finds the same column wrong again.
 pub fn tried(
     findings: Vec<Finding>,
     rows: &[Sample],

@@ -1,4 +1,4 @@
-//! Columns that never change.
+//! Checks for columns that never change.
 
 use super::ENOUGH;
 use super::relation::values;
@@ -6,7 +6,7 @@ use crate::Sample;
 use crate::columns::{BLOCK, COLUMNS, NEEDED};
 use crate::finding::Finding;
 
-/// Columns that show one and the same value, though they should move.
+/// Findings about columns that are constant though they should change.
 pub fn check(rows: &[Sample]) -> Vec<Finding> {
     let mut seen = COLUMNS.map(|_| Seen::default());
     for block in rows.chunks(BLOCK) {
@@ -17,7 +17,7 @@ pub fn check(rows: &[Sample]) -> Vec<Finding> {
     seen.iter().zip(COLUMNS).filter_map(|(seen, (name, ..))| dead(seen, name)).collect()
 }
 
-/// What a column shows.
+/// First value of a column, number of its values, and whether they differ.
 #[derive(Default)]
 struct Seen {
     first: Option<f64>,
@@ -45,7 +45,8 @@ fn dead(seen: &Seen, name: &'static str) -> Option<Finding> {
     Some(if needed { Finding::problem(text) } else { Finding::warning(text) })
 }
 
-/// Commands that are constant in flight: another channel or instance has the commands that fly the aircraft.
+/// A problem if the commands of aileron and elevator are constant in flight. Another channel or instance then has the
+/// commands that fly the aircraft.
 pub fn commands(flown: &[Sample]) -> Option<Finding> {
     let rests = |name: &str| {
         let get = COLUMNS.iter().find(|c| c.0 == name).map(|c| c.1)?;

@@ -1,4 +1,4 @@
-//! Accelerometers: unit and sign of each axis.
+//! Checks of the accelerometers: unit and sign of each axis.
 
 use super::cured;
 use super::relation::{change, mean, quantile, values, windows, with_intercept};
@@ -9,10 +9,10 @@ use greylag_physics::atmosphere::STANDARD_GRAVITY;
 const G: f64 = STANDARD_GRAVITY;
 /// Window over which accelerations are compared, s.
 const WINDOW_S: f64 = 1.0;
-/// Bank and pitch of about level flight, rad, and the greatest rate, rad/s.
+/// Largest bank and pitch angle (rad) and largest body rate (rad/s) of about level flight.
 const LEVEL: [f64; 2] = [0.8, 0.5];
 const LEVEL_RATE: f64 = 1.0;
-/// Specific force of about level flight, g.
+/// Magnitude of the specific force in about level flight, g.
 const CARRIED: std::ops::Range<f64> = 0.5..1.5;
 /// Correlation below which a sign is called wrong.
 const TURNED: f64 = -0.7;
@@ -47,8 +47,8 @@ fn unit(middle: f64) -> Option<(&'static str, f64)> {
     }
 }
 
-/// Whether the aircraft flies about level and carries about its weight, so that the force shows which way z is: a
-/// dive or a tumble may push it down for long. What is unknown of the attitude counts as level.
+/// Whether the aircraft is about level and has a load factor of about one, so that the specific force shows the
+/// direction of z. In a dive or a tumble it may point down for long. Unknown angles count as level.
 fn is_level(s: &Sample) -> bool {
     let size = s.specific_force_mps2.iter().map(|a| a * a).sum::<f64>().sqrt();
     let beyond = (0..2).any(|i| s.attitude_rad[i].abs() > LEVEL[i]);

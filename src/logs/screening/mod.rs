@@ -1,9 +1,9 @@
 //! Screening: wrong units, signs and axes, found before anything is computed from a log.
 //!
-//! Each check uses a relation that holds for every aeroplane whatever its coefficients: Euler angles are the
-//! integral of the body rates, a steady turn has V ψ̇ = g tan φ, altitude is the integral of the climb, a
-//! surface accelerates the aircraft in its own direction. A finding names the column and the mapping that
-//! cures it. Nothing is converted unasked.
+//! Each check uses a relation that holds for every aeroplane whatever its coefficients: Euler angles are the integral
+//! of the body rates, a steady turn has V ψ̇ = g tan φ, altitude is the integral of the climb, a surface accelerates
+//! the aircraft in its own direction. A finding names the column and the mapping that corrects it. No column is
+//! converted without a mapping.
 
 mod air;
 mod angles;
@@ -24,7 +24,7 @@ use super::phases::{self, Flying, PhaseKind};
 /// Smallest number of rows for checks of units.
 const ENOUGH: usize = 50;
 
-/// All findings in the rows of an aircraft with the flight limits `flies`.
+/// All findings about `rows`. `flies` are the criteria for flight.
 pub fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
     if rows.is_empty() {
         return vec![Finding::problem("the log has no rows with all needed channels")];
@@ -35,7 +35,8 @@ pub fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
         let of = |rows: &[Sample]| checks(rows, &in_flight(rows, flies), flies);
         out = cure::tried(checks(rows, &flown, flies), rows, of);
         let dead = dead::check(rows);
-        // On the ground a channel may be constant, in a simulation exactly so.
+        // On the ground a channel may be constant, in a simulation exactly so. Without a flight only a constant
+        // airspeed is reported.
         out.extend(
             dead.into_iter().filter(|f| !flown.is_empty() || f.text.starts_with("airspeed")),
         );
@@ -49,7 +50,8 @@ pub fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
     out
 }
 
-/// Checks of units, signs and axes in wing-borne flight: hover and ground obey other relations.
+/// Checks of units, signs and axes. They use the rows in wing-borne flight (`flown`) if there are enough, because
+/// other relations hold in hover and on the ground.
 fn checks(rows: &[Sample], flown: &[Sample], flies: &Flying) -> Vec<Finding> {
     if let Some(clock) = clock::check(rows) {
         return vec![clock];
@@ -65,7 +67,7 @@ fn checks(rows: &[Sample], flown: &[Sample], flies: &Flying) -> Vec<Finding> {
     out
 }
 
-/// The rows in flight; not copied where they lie side by side.
+/// The rows in flight. They are copied only if other rows lie between them.
 fn in_flight<'a>(rows: &'a [Sample], flies: &Flying) -> Cow<'a, [Sample]> {
     let phases = phases::phases(rows, flies);
     let flights: Vec<_> = phases.iter().filter(|p| p.kind == PhaseKind::Flight).collect();
@@ -80,7 +82,7 @@ fn in_flight<'a>(rows: &'a [Sample], flies: &Flying) -> Cow<'a, [Sample]> {
     }
 }
 
-/// Whether there is a flight, and one that is long enough.
+/// A problem if the log has no flight, or if its flight time is too short; else `None`.
 fn flight(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     let flights: Vec<_> =
         phases::phases(rows, flies).into_iter().filter(|p| p.kind == PhaseKind::Flight).collect();

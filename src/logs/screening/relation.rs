@@ -15,7 +15,8 @@ pub fn values(rows: &[Sample], get: impl Fn(&Sample) -> f64) -> Vec<f64> {
     rows.iter().map(get).filter(|x| x.is_finite()).collect()
 }
 
-/// Bank and pitch within which directions are judged, rad, and the pitch and yaw rate, rad/s.
+/// Largest bank and pitch angle (rad), and largest pitch and yaw rate (rad/s), at which the sign of a column is
+/// judged.
 const TAME: [f64; 2] = [1.3, 0.7];
 const TAME_RATE: f64 = 3.0;
 
@@ -32,12 +33,12 @@ pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
     (values.len() >= super::ENOUGH).then(|| statistics::quantile(values, q))
 }
 
-/// Whether `x` is within the share `tolerance` of `target`.
+/// Whether `x` differs from `target` by less than the fraction `tolerance` of it.
 pub fn near(x: f64, target: f64, tolerance: f64) -> bool {
     (x / target - 1.0).abs() < tolerance
 }
 
-/// Windows of about `length_s` without a gap, one after the other.
+/// Consecutive windows of about `length_s` (s), without gaps in them.
 pub fn windows(rows: &[Sample], length_s: f64) -> Vec<&[Sample]> {
     let times = values(rows, |s| s.time_s);
     let periods: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).filter(|p| *p > 0.0).collect();
@@ -71,12 +72,12 @@ pub fn mean(window: &[Sample], value: impl Fn(&Sample) -> f64) -> f64 {
     window.iter().map(value).sum::<f64>() / window.len() as f64
 }
 
-/// How much `value` grows from the first to the last row of a window.
+/// The change of `value` from the first to the last row of a window.
 pub fn change(window: &[Sample], value: impl Fn(&Sample) -> f64) -> f64 {
     value(&window[window.len() - 1]) - value(&window[0])
 }
 
-/// How y follows x.
+/// Result of a regression of y on x.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relation {
     /// Slope dy/dx.
@@ -106,8 +107,8 @@ fn relation(pairs: Vec<(f64, f64)>) -> Option<Relation> {
         .then(|| Relation { slope: xy / xx, correlation: xy / (xx * yy).sqrt() })
 }
 
-/// The partial correlation of y with the last regressor of each row, all others and a constant being
-/// partialled out (Frisch–Waugh–Lovell); `None` for too few rows, or where the others determine it.
+/// The partial correlation of y with the last regressor of each row, all others and a constant being partialled out
+/// (Frisch–Waugh–Lovell). `None` for too few rows, or if the others determine the last regressor.
 pub fn partial_correlation(rows: &[(Vec<f64>, f64)]) -> Option<f64> {
     let width = rows.first()?.0.len();
     if rows.len() < 10 * width {

@@ -1,4 +1,4 @@
-//! Surfaces and throttle: units, and whether they move the aircraft in their own direction.
+//! Checks of surfaces and throttle: units, and whether a surface accelerates the aircraft in the right direction.
 
 use super::cured;
 use super::relation::{change, mean, partial_correlation, quantile, tame, values, windows};
@@ -6,7 +6,7 @@ use crate::Sample;
 use crate::finding::Finding;
 use crate::phases::Flying;
 
-/// Deflection beyond which no surface is for a hundredth of the time, rad (69°).
+/// A column is in degrees if more than 1 % of its values exceed this, rad (69°).
 const DEFLECTION_LARGE: f64 = 1.2;
 /// Magnitude above which a command cannot be normalised to −1..1.
 const COMMAND_LARGE: f64 = 1.5;
@@ -17,7 +17,7 @@ const TURNED: f64 = 0.6;
 
 type Get = fn(&Sample) -> f64;
 
-/// Units, then polarity where the units and the axes are right.
+/// Checks the units, then the polarity if units and axes are right.
 pub fn check(rows: &[Sample], axes_are_right: bool, flies: &Flying) -> Vec<Finding> {
     let mut out: Vec<Finding> = units(rows);
     if out.is_empty() && axes_are_right {
@@ -76,7 +76,7 @@ fn throttle(column: &str, size: f64) -> Finding {
     }
 }
 
-/// Regression of ṗ on p, r, β and the aileron: positive is right wing down.
+/// Checks the polarity of the aileron by a regression of ṗ on p, r, β and the aileron. Positive is right wing down.
 fn aileron(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     let (column, get) =
         moving(rows, [("aileron_rad", |s| s.aileron_rad), ("aileron_cmd", |s| s.aileron_cmd)])?;
@@ -93,8 +93,8 @@ fn aileron(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     })
 }
 
-/// Regression of q̇ on q, α (or the normal force in its place) and the elevator: positive is nose
-/// down.
+/// Checks the polarity of the elevator by a regression of q̇ on q, α and the elevator. Without α the normal force
+/// takes its place. Positive is nose down.
 fn elevator(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     let (column, get) =
         moving(rows, [("elevator_rad", |s| s.elevator_rad), ("elevator_cmd", |s| s.elevator_cmd)])?;
@@ -110,12 +110,12 @@ fn elevator(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     })
 }
 
-/// Whether half of the rows have the column.
+/// Whether more than half of the rows have the column.
 fn has(rows: &[Sample], get: Get) -> bool {
     2 * values(rows, get).len() > rows.len()
 }
 
-/// The first of the columns that the log has and that moves.
+/// The first of the columns that has values in more than half of the rows and that changes.
 fn moving(rows: &[Sample], columns: [(&'static str, Get); 2]) -> Option<(&'static str, Get)> {
     columns.into_iter().find(|(_, get)| {
         let all = values(rows, *get);

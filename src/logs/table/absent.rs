@@ -30,7 +30,7 @@ mod tests {
         let said = finding(&[&built_in, &own, &table]).unwrap().text;
         assert!(said.ends_with("without a number: WIND.AOA for alpha_rad"), "{said}");
         assert_eq!(finding(&[&built_in, &table]), None);
-        // as a log is read
+        // the same finding results when a log is read
         let found = super::super::build(&Topics::default(), &[own], &[]).findings;
         assert!(found.iter().any(|f| f.text == said), "{found:?}");
     }

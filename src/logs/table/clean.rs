@@ -2,10 +2,11 @@
 
 use std::borrow::Cow;
 
-/// A time that is this much later than the two after it is wrong, s.
+/// A time is damaged if it is later than the next two times by more than this, s.
 const AHEAD_S: f64 = 1.0;
 
-/// Times that increase with finite values; the topic's own where they do so already.
+/// Returns the samples with finite values at increasing times. The topic's own times are borrowed if all samples are
+/// so.
 pub(super) fn cleaned(all_times: &[f64], all: Vec<Vec<f64>>) -> (Cow<'_, [f64]>, Vec<Vec<f64>>) {
     let increasing = all_times.windows(2).all(|w| w[0] < w[1]);
     let finite = |values: &[f64]| values.iter().all(|x| x.is_finite());
@@ -25,8 +26,8 @@ pub(super) fn cleaned(all_times: &[f64], all: Vec<Vec<f64>>) -> (Cow<'_, [f64]>,
     (Cow::Owned(times), series)
 }
 
-/// Whether the first of `times` is far ahead of the next two, which continue from `last` (s). All later samples would be
-/// left out behind such a damaged time.
+/// Whether the first of `times` is damaged: far ahead of the next two, which continue from `last` (s). If such a time
+/// were kept, the samples after it would be dropped as out of order.
 fn is_ahead(times: &[f64], last: f64) -> bool {
     let [t, next @ ..] = times else { return false };
     let continues = |next: &f64| *next > last && *next < t - AHEAD_S;
@@ -46,7 +47,7 @@ mod tests {
         let (kept, series) = cleaned(&times, values);
         assert_eq!((kept.len(), series[0].len()), (98, 98));
         assert!(kept.windows(2).all(|w| w[0] < w[1]) && series[0][40] == 41.0);
-        // A clock that starts again is not mended: the two recordings are not one.
+        // After a restart of the clock the samples are dropped, because they belong to another recording.
         let again: Vec<f64> = (0..100).map(|k| f64::from(k % 50)).collect();
         let (kept, _) = cleaned(&again, vec![vec![0.0; 100]]);
         assert_eq!(kept.len(), 50);

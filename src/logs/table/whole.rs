@@ -5,16 +5,17 @@ use crate::Sample;
 use crate::stretches::{LENGTH_S, Stretches};
 use crate::topics::Topics;
 
-/// A table of which only stretches are kept.
+/// Statistics of a whole log of which the table keeps only stretches.
 pub(crate) struct Whole {
-    /// The stretches, without the phases of the whole.
+    /// The stretches, whose `phases` are still empty.
     pub stretches: Stretches,
-    /// Airspeed of the whole log, of one row a second at least.
+    /// Airspeed, air density and altitude of the whole log, at least one row a second.
     pub air: Vec<Sample>,
 }
 
 impl Whole {
-    /// Statistics of the whole log, if only stretches of the topic of the table's times are kept.
+    /// Statistics of the whole log. `base` is the track whose times the table has. `None` if all samples of `base`
+    /// are kept.
     pub(super) fn of(base: &Track<'_>, topics: &Topics, tracks: &[Track<'_>]) -> Option<Whole> {
         let watch = base.watch()?;
         let stretches = Stretches {

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use crate::number::Number;
 
-/// Nesting of message types; PX4 has three levels at most.
+/// Largest nesting of message types that is followed. PX4 has three levels at most.
 const DEPTH: usize = 8;
-/// Numeric fields of one topic; PX4's largest has a few hundred.
+/// Largest number of numeric fields of a topic. PX4's largest topic has a few hundred.
 const FIELDS: usize = 2048;
 
 /// A field of a subscribed topic, flattened.
@@ -24,9 +24,9 @@ pub(super) struct Layout {
     /// Types and positions of `timestamp` and `timestamp_sample`.
     pub stamp: Option<(Number, usize)>,
     pub sampled: Option<(Number, usize)>,
-    /// Bytes of a whole record, without the padding at its end, which PX4 does not write.
+    /// Bytes of a record's fields without the padding at the end, which PX4 does not write.
     pub size: usize,
-    /// Bytes of a whole record with that padding.
+    /// Bytes of a record's fields with that padding.
     pub padded: usize,
 }
 
@@ -49,7 +49,8 @@ impl Layout {
     }
 }
 
-/// The numeric fields of message `name`, nested ones as `outer.inner`, elements as `field[0]`.
+/// Appends the numeric fields of message `name` to `out`. Nested fields are named `outer.inner`, array elements
+/// `field[0]`.
 fn flatten(
     formats: &BTreeMap<String, String>,
     name: &str,

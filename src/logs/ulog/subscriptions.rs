@@ -1,4 +1,4 @@
-//! The topics of a ULog by the numbers of their messages.
+//! The subscriptions of a ULog, which assign a topic to each message number.
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -7,11 +7,11 @@ use super::RECORD;
 use super::layout::Layout;
 use crate::topics::Topic;
 
-/// A message number's topic.
+/// The topic of one message number.
 pub(super) struct Subscription {
     pub key: (String, u16),
     pub layout: Rc<Layout>,
-    /// Place of its records in the [`Series`]; `None` before the first record.
+    /// Index of its records in the [`Series`]; `None` before the first record.
     pub place: Option<usize>,
     pub count: usize,
 }
@@ -34,7 +34,7 @@ pub(super) struct Series {
 }
 
 impl Series {
-    /// Place of the series of `key`, which begins with `new` if it is the first of its key.
+    /// Index of the series of `key`. If there is none yet, it begins with `new`.
     pub fn place(&mut self, key: &(String, u16), new: impl FnOnce() -> Topic) -> usize {
         if let Some(place) = self.places.get(key) {
             return *place;
@@ -44,7 +44,7 @@ impl Series {
         self.topics.len() - 1
     }
 
-    /// The series at a place that [`Series::place`] returned.
+    /// The series at an index that [`Series::place`] returned.
     pub fn at(&mut self, place: usize) -> &mut Topic {
         &mut self.topics[place]
     }
@@ -57,10 +57,10 @@ impl Series {
     }
 }
 
-/// The subscriptions by their message numbers, for fast look-up: each record needs several.
+/// The subscriptions by message number. Each record needs several look-ups, which are fast here.
 #[derive(Default)]
 pub(super) struct Subscriptions {
-    /// Place of each number among the others, from 1 on; 0 of a number that is not there.
+    /// Position of each message number in `all`, counted from 1; 0 for a number without a subscription.
     places: Vec<u16>,
     pub all: Vec<(u16, Subscription)>,
 }

@@ -1,8 +1,9 @@
 //! Reader of AVL's stability derivatives, commands `ST` and `SB`.
 //!
-//! The text has rows of `NAME = number`, with totals at a reference angle of attack. Derivatives are with respect to α and β
-//! (1/rad), pb/2V, qc/2V, rb/2V, and controls, whose names are above their columns. `ST` is in stability axes, which are
-//! converted to body axes. `SB` is with respect to u, v, w over V, in body axes.
+//! The text has rows of `NAME = number`, with the total coefficients at a reference angle of attack. `ST` gives derivatives
+//! with respect to α and β (1/rad), pb/2V, qc/2V, rb/2V, and the controls, whose names are above their columns. It gives
+//! moments about stability axes, which are converted to body axes. `SB` gives derivatives with respect to u/V, v/V and w/V in
+//! place of α and β, in body axes.
 
 use super::numbers::Numbers;
 use super::{Column, Control, Derivatives, DerivativesError, Tool, about_body, to_body};
@@ -12,7 +13,7 @@ const FROM: &str = "AVL's command ST (or SB), given in the menu OPER after a run
 /// AVL's names of side force, lift, rolling, pitching and yawing moment.
 const NAMES: [&str; 5] = ["CY", "CL", "Cl", "Cm", "Cn"];
 
-/// Reads AVL's `text`. Control derivatives are converted to 1/rad. `radians` is their unit of angle in rad.
+/// Reads AVL's `text`. Control derivatives are converted to 1/rad. `radians` is the text's unit of deflection, in rad.
 pub(super) fn read(text: &str, radians: f64) -> Result<Derivatives, DerivativesError> {
     let numbers = Numbers::read(text)?;
     let alpha = numbers.need("Alpha", FROM)?.to_radians();
@@ -58,7 +59,7 @@ fn column(
     Ok(to_body(all, alpha))
 }
 
-/// Names of the controls, each with the suffix of its derivatives. A line contains `aileron d01 elevator d02`.
+/// Names of the controls, each with the suffix of its derivatives, from lines such as `aileron d01 elevator d02`.
 fn control_names(text: &str) -> Vec<(String, String)> {
     let mut all: Vec<(String, String)> = Vec::new();
     for line in text.lines().filter(|line| !line.contains('=')) {

@@ -1,4 +1,4 @@
-//! Plausibility checks of derivatives. A quantity that a tool did not compute is zero in its output and is rejected.
+//! Plausibility checks of derivatives. A tool writes zero for a quantity that it did not compute. Such a value is rejected.
 
 use super::{Tool, Value};
 use crate::textbook::{Measures, Tail};

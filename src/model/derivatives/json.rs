@@ -1,9 +1,9 @@
 //! Reader of results of OptVL and AeroSandbox in Python, written as JSON.
 //!
-//! The quantities have the tools' names, under a few keys of this program. The ten lines that write the file are in
-//! docs/how-to/add-an-aircraft.md. OptVL has `dCL/dalpha`, moments about stability axes with a prime (`dCl'/dp'`), and controls
-//! per degree. AeroSandbox has `CLa`, and moments about body axes. Its control derivatives are differences per degree that the
-//! script computes.
+//! A short Python script writes the file; it is in docs/how-to/add-an-aircraft.md. The keys are the tools' own names and a
+//! few of this program, such as `alpha_deg`. OptVL has names like `dCL/dalpha`, moments about stability axes with a prime
+//! (`dCl'/dp'`), and control derivatives per degree. AeroSandbox has names like `CLa` and moments about body axes. It has no
+//! control derivatives: the script computes them as differences per degree.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,8 @@ use serde_json::{Map, Value};
 
 use super::{Column, Control, Derivatives, DerivativesError, Tool, about_body, positive, to_body};
 
-/// Content of a document: its numbers at any depth (except those of `controls`), and its other entries.
+/// Content of a document: its numbers at any depth (except those of `controls`), and its entries `controls`, `tool` and
+/// `XYZref`.
 struct Flat<'a> {
     numbers: BTreeMap<&'a str, f64>,
     controls: Option<&'a Map<String, Value>>,
@@ -19,7 +20,7 @@ struct Flat<'a> {
     point: Option<[f64; 2]>,
 }
 
-/// Reads a JSON document. Control derivatives are converted to 1/rad. `radians` is their unit of angle in rad.
+/// Reads a JSON document. Control derivatives are converted to 1/rad. `radians` is the document's unit of deflection, in rad.
 pub(super) fn read(text: &str, radians: f64) -> Result<Derivatives, DerivativesError> {
     let flat = document(text)?;
     let flat = Flat::of(&flat)?;

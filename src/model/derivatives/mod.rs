@@ -19,7 +19,7 @@ use super::textbook::{Estimate, Measures, Section};
 /// Data of an aircraft in addition to its derivatives.
 #[derive(Clone, Debug)]
 pub struct Beside {
-    /// Name, mass, tail, travel and thrust. The file's span and area replace those given here.
+    /// Name, mass, tail, travel and thrust. The file's span and area replace the values given here.
     pub measures: Measures,
     /// The file's unit of length, m.
     pub metres: f64,
@@ -50,7 +50,7 @@ pub enum DerivativesError {
     Missing {
         /// Name of the number.
         name: String,
-        /// Which output of the tool contains the number.
+        /// Text that says which output of the tool contains the number.
         tool: &'static str,
     },
     /// A value is not a number.
@@ -248,12 +248,13 @@ fn lateral(d: &Derivatives) -> Vec<Value> {
     ]
 }
 
-/// Derivatives with respect to aileron, elevator and rudder in this program's sign convention. Coefficients that the file
-/// lacks keep their textbook values.
+/// Derivatives with respect to aileron, elevator and rudder, converted to this program's sign convention. A control that
+/// the file lacks has no entry, and its coefficients keep their textbook values.
 fn controls(d: &Derivatives, measures: &Measures, notes: &mut Vec<String>) -> Vec<Value> {
     let mut out = Vec::new();
     let mut used = Vec::new();
-    // for each control: the index of its primary moment in a column, and the moment's sign for a positive deflection
+    // for each control: a part of its name, the index of its primary moment in a column, and the sign of this moment for a
+    // positive deflection
     for (control, word, place, sign) in
         [("aileron", "ail", 2, 1.0), ("elevator", "elev", 3, -1.0), ("rudder", "rud", 4, -1.0)]
     {
@@ -312,7 +313,7 @@ fn slope_and_zero(sections: &[Section]) -> [f64; 2] {
     [value(sections, "lift_linear", "CLalpha"), value(sections, "lift_linear", "CL0")]
 }
 
-/// Adapts the induced drag to the lift derivatives of the file.
+/// Recomputes the coefficients of induced drag from the lift derivatives of the file.
 fn trimmed(sections: &mut [Section], measures: &Measures) {
     let [slope, zero] = slope_and_zero(sections);
     let [linear, square] = measures.induced_by(slope, zero);

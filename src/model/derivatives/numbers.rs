@@ -43,7 +43,7 @@ impl Numbers {
         self.0.get(name).copied()
     }
 
-    /// The number `name`. The error for a missing number contains `tool`, which names the output with this number.
+    /// The number `name`. The error for a missing number contains `tool`, a text that says which output contains the number.
     pub fn need(&self, name: &str, tool: &'static str) -> Result<f64, DerivativesError> {
         let missing = || DerivativesError::Missing { name: name.into(), tool };
         self.get(name).ok_or_else(missing)

@@ -28,7 +28,7 @@ pub enum Tool {
 }
 
 impl Tool {
-    /// All tools whose derivatives can be read.
+    /// All tools, in the order of the enumeration.
     pub const ALL: [Tool; 7] = [
         Tool::Textbook,
         Tool::Avl,
@@ -52,8 +52,8 @@ impl Tool {
         }
     }
 
-    /// Name of the tools whose errors are used if the tables have none for this tool. Lattice methods form one family, because
-    /// they have similar errors.
+    /// Name of the family of tools whose errors are used if the tables have none for this tool. AVL, OptVL and XFLR5 form one
+    /// family, because their errors are similar.
     pub fn family(self) -> &'static str {
         match self {
             Tool::Avl | Tool::OptVl | Tool::Xflr5 => "lattice",

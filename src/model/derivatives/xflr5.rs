@@ -21,7 +21,7 @@ pub(super) fn read(text: &str) -> Result<Derivatives, DerivativesError> {
     let need = |name: &str| numbers.need(name, FROM);
     let alpha = need("Alpha")?.to_radians();
     let reference = numbers.reference(FROM)?;
-    // the log of a symmetric aircraft has only these derivatives
+    // the log has only the derivatives that a symmetric aircraft has, and the others are zero
     let stability = |values: [Option<f64>; 5]| -> Column {
         to_body(values.map(Option::unwrap_or_default), alpha)
     };

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use super::aerodynamics;
 use crate::GreyBox;
 
-/// Settings that every JSBSim aircraft has, which need no declaration.
+/// Properties that every JSBSim aircraft has. They need no declaration.
 const OF_JSBSIM: [&str; 4] =
     ["fcs/flap-cmd-norm", "fcs/speedbrake-cmd-norm", "fcs/spoiler-cmd-norm", "gear/gear-cmd-norm"];
 
@@ -112,7 +112,7 @@ impl<'a> Conditions<'a> {
         names.join(", ")
     }
 
-    /// Declaration of the property with the lowest setting. Empty if JSBSim has the property already.
+    /// Declaration of the property, with the lowest setting as its initial value. Empty if JSBSim has the property already.
     pub(super) fn declaration(&self) -> String {
         match &self.settings[..] {
             [_] => String::new(),

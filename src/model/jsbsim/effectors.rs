@@ -63,7 +63,7 @@ pub(super) fn channels(mixer: &Mixer, figures: &ActuatorFigures) -> Option<Strin
     Some(out)
 }
 
-/// The actuator filter of the control on which the surface has its largest gain.
+/// The actuator filter of the control that moves the surface with the largest gain.
 fn like(effector: &Effector, figures: &ActuatorFigures) -> Surface {
     let [aileron, elevator, rudder, _] = effector.gains.map(f64::abs);
     match figures.rudder {

@@ -66,8 +66,8 @@ impl Cruise {
         Ok(Cruise { trim, rates: rates(model, &trim, altitude), excess, time })
     }
 
-    /// The short period, from the eigenvalues of the states q and α: the largest growth rate (1/s, negative for decay) and the
-    /// largest natural frequency (rad/s).
+    /// The short period, approximated by the eigenvalues of the system of q and α alone: the largest growth rate (1/s, negative
+    /// for decay) and the largest natural frequency (rad/s).
     pub(super) fn short_period(&self) -> [f64; 2] {
         let a = &self.rates.a;
         let short = Matrix2::new(a[(4, 4)], a[(4, 6)], a[(6, 4)], a[(6, 6)]);

@@ -1,4 +1,4 @@
-//! Random draws of aircraft from a distribution: measures within ranges, coefficients about textbook values.
+//! Random draws of aircraft from a distribution: mass and dimensions within ranges, coefficients about textbook values.
 
 use rand_distr::{Distribution, StandardNormal, Uniform};
 
@@ -57,7 +57,7 @@ pub struct Drawn {
     pub static_margin: f64,
     /// Delay between a command and the surface's response in addition to the servo's lag, s.
     pub delay_s: f64,
-    /// Measures of the aircraft, as a user could state them.
+    /// Mass, dimensions and propulsion of the aircraft, as a user could state them.
     pub measures: Measures,
     /// The exact model of the aircraft.
     pub exact: GreyBox,
@@ -82,7 +82,7 @@ pub enum DrawError {
 }
 
 fn uniform(rng: &mut Stream, [least, most]: Range) -> f64 {
-    // a range with equal ends is a fixed number
+    // this does not fail: the reader of the distribution has checked that the ends are finite and in order
     Uniform::new_inclusive(least, most).map_or(least, |between| between.sample(rng))
 }
 
@@ -107,7 +107,7 @@ impl Population {
             match self.one(&mut rng, seed, number) {
                 Ok(drawn) if self.flies(&drawn.exact) => return Ok(drawn),
                 Ok(_) => {}
-                // a coefficient is outside its physical bounds in the catalogue
+                // for example, a coefficient is outside the catalogue's physical bounds
                 Err(error) => why = error,
             }
         }
@@ -204,7 +204,8 @@ impl Population {
         sections
     }
 
-    /// Sets the balance of moments: the static margin, the elevator at cruise, and the asymmetry in roll and yaw.
+    /// Sets the coefficients that determine the balance of moments: static margin, elevator at cruise, and asymmetry in roll
+    /// and yaw.
     fn balanced(
         &self,
         rng: &mut Stream,
@@ -239,7 +240,8 @@ impl Population {
     }
 }
 
-/// Extends the airframe's pitch limit to 20° nose down. The textbook's limit is for a first flight, this one for tests.
+/// Extends the airframe's pitch limit from 10° to 20° nose down. The textbook's limit is for a first flight; drawn aircraft
+/// are used in tests.
 fn deeper(airframe: &str) -> String {
     airframe.replace("pitch_min_deg = -10.0", "pitch_min_deg = -20.0")
 }

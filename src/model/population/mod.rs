@@ -1,4 +1,5 @@
-//! A distribution of fixed-wing aircraft. Each drawn aircraft has an exact model and the textbook model of its measures.
+//! A distribution of fixed-wing aircraft. Each drawn aircraft has an exact model, and a textbook model that is estimated
+//! from its mass, dimensions and propulsion.
 
 mod character;
 mod draw;
@@ -94,8 +95,8 @@ impl Population {
     /// Reads a distribution from a file (`schema = 1`).
     ///
     /// # Errors
-    /// If the file cannot be read, is not TOML of this schema, or has a range whose ends are not finite, in order and, where
-    /// required, positive. Invalid shares of the layouts are also an error.
+    /// If the file cannot be read, is not TOML of this schema, or has invalid proportions of the layouts. Also if the ends of a
+    /// range are not finite, not in order, or not positive where this is required.
     pub fn load(path: &Path) -> Result<Population, FileError> {
         let what = "distribution of aircraft";
         let text = greylag_physics::text_file::read(path).map_err(|why| FileError::Read {

@@ -10,7 +10,7 @@ const FIN: [f64; 4] = [0.04, 0.4, 3.0, 0.55];
 const EFFICIENCY: f64 = 0.85;
 
 impl Measures {
-    /// The one of two sources that fits the aircraft's tail.
+    /// Selects the text of a source according to the aircraft's tail.
     fn source(&self, conventional: &'static str, flying_wing: &'static str) -> &'static str {
         match self.tail {
             Tail::Conventional => conventional,

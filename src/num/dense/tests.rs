@@ -1,9 +1,9 @@
-//! Tests of networks: against their definition with every scalar type, and against central differences.
+//! Tests of network outputs against their definition with every scalar type, and of derivatives against central differences.
 
 use super::*;
 use crate::{Dual, Lanes, stream};
 
-/// A network without a layer size that is a multiple of the block size.
+/// A network whose layer sizes are not multiples of the block sizes.
 fn network() -> Dense {
     let mut network = Dense::silent(&[3, 21, 9, 2], &mut stream::stream(5, &[])).unwrap();
     let mut rng = stream::stream(6, &[]);
@@ -40,7 +40,7 @@ fn answers_are_the_definition_over_every_scalar() {
         let lanes: [Lanes<4>; 2] = network.evaluate(x.map(Lanes::from_f64));
         let fused: [Lanes<4, true>; 2] = network.evaluate(x.map(Lanes::from_f64));
         for i in 0..2 {
-            // rounding of sums of 21 terms of order one
+            // tolerance for the rounding of sums of 21 terms of order one
             assert!((plain[i] - expected[i]).abs() < 1e-14);
             for lane in [lanes[i].0[3], fused[i].0[0]] {
                 assert!((f64::from(lane) - expected[i]).abs() < 3e-6);
@@ -61,7 +61,7 @@ fn wide_networks_answer_in_a_room_of_their_own() {
         let one = network.evaluate_one(&mut single, &x.map(|x| x as f32));
         let lanes = network.evaluate_in(&mut lanes, &x.map(Lanes::from_f64));
         for i in 0..2 {
-            // rounding of sums of 300 terms below one
+            // tolerance for the rounding of sums of 300 terms below one
             assert!((plain[i] - expected[i]).abs() < 1e-14);
             assert!((f64::from(one[i]) - expected[i]).abs() < 1e-6);
             assert!((f64::from(lanes[i].0[2]) - expected[i]).abs() < 1e-6);

@@ -117,7 +117,7 @@ impl Register for __m256 {
     }
 }
 
-/// AVX-512 Foundation (F).
+/// The AVX-512 Foundation instructions (AVX-512F).
 impl Register for __m512 {
     intrinsics!(__m512, 16, 16, _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps _mm512_min_ps
         _mm512_max_ps _mm512_sqrt_ps _mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps);

@@ -112,7 +112,7 @@ impl SurfaceFile {
     }
 }
 
-/// Travel of `name` (rad), either symmetric (`both`) or with two limits (`min`, `max`).
+/// Travel (rad) that a file states, either symmetric (`both`) or with two limits (`min`, `max`). The error names `name`.
 pub(super) fn travel(
     name: &str,
     [both, min, max]: [&Option<Sourced>; 3],

@@ -46,8 +46,8 @@ pub(super) struct MotorFile {
 
 /// The mixer described by the file. `None` if the file names neither surfaces nor motors.
 ///
-/// If the file names only surfaces, one motor follows the throttle. If it names only motors, the surfaces are those of
-/// `travels`.
+/// If the file names only surfaces, one motor driven by the throttle is added. If the file names only motors, one surface
+/// is added for each axis that has a travel in `travels`.
 pub(super) fn mixer(
     surfaces: &BTreeMap<String, SurfaceFile>,
     motors: &BTreeMap<String, MotorFile>,

@@ -4,7 +4,7 @@ use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coeffici
 use greylag_num::Real;
 use crate::{Channel, Point, State};
 
-/// Airspeed of the neutral start, m/s. At this airspeed the model's effectiveness is unchanged.
+/// Airspeed at which the effectiveness equals the model's, m/s: that of `State::NEUTRAL`.
 const V0: f64 = State::NEUTRAL.airspeed;
 
 /// Effectiveness of aileron and elevator that decreases with dynamic pressure.

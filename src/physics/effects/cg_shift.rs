@@ -4,7 +4,8 @@ use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Moments of the forces about a centre of gravity that is aft of the model's along x. A negative distance is forward.
+/// Change of the moments if the centre of gravity lies aft of the model's, along body x. A negative distance means
+/// forward.
 pub struct CgShift;
 
 impl Effect for CgShift {

@@ -11,7 +11,7 @@ use greylag_num::Real;
 const FIRST_DEG: f64 = -8.0;
 /// Distance between knots of the grid, degrees.
 const SPACING_DEG: f64 = 2.0;
-/// Range with half the distance between knots, degrees of angle of attack. The stall is in this range.
+/// Range of angles of attack in which the knots are half as far apart, degrees. The stall is in this range.
 const FINE_DEG: (f64, f64) = (10.0, 20.0);
 /// Number of knots, from −8° to 30°.
 const PLACES: usize = 25;
@@ -40,7 +40,8 @@ pub(super) use heights;
 
 /// Adds to `terms` each hat function at `alpha` (rad) times `amount`. Beyond its first and last knot a curve is constant.
 ///
-/// Unlike other effects it is not inlined if a call is cheap, because inlining would enlarge the code of every fit.
+/// Other effects are always inlined. This function is inlined only for scalars in SIMD registers; elsewhere it would
+/// enlarge the code of every fit.
 #[inline(always)]
 pub(super) fn hats<R: Real>(alpha: R, amount: R, channel: Channel, terms: &mut impl Terms<R>) {
     #[inline(never)]
@@ -99,7 +100,7 @@ mod tests {
         assert_eq!(names.len(), KNOTS);
         let share =
             |degrees: f64, name: &str| at(degrees)[names.iter().position(|n| *n == name).unwrap()];
-        // −1° is half way between −2° and 0°, where the curve is zero
+        // −1° is half way between the knots −2° and 0°, and the curve is zero at 0°
         assert!((share(-1.0, "CL_m2") - 0.5).abs() < 1e-12);
         assert!((share(9.5, "CL_p10") - 0.75).abs() < 1e-12);
         assert!((share(10.5, "CL_p10") - 0.5).abs() < 1e-12 && share(11.5, "CL_p10") == 0.0);

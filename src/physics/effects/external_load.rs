@@ -6,9 +6,9 @@ use crate::{Channel, Point, rigid_body};
 
 /// A constant force at the centre of gravity in the direction of gravity.
 ///
-/// A tether or a tow also pulls horizontally, in a direction fixed to the ground. The state has no heading, and only the
-/// vertical part of such a force is modelled. The load adds no mass. For a load that moves with the aircraft the effect is
-/// `mass_error`.
+/// A tether or a tow also pulls horizontally, in a direction fixed to the ground. Only the vertical part of such a force is
+/// modelled, because the state has no heading. The load adds no mass. A load that moves with the aircraft is described by
+/// `mass_error` instead.
 pub struct ExternalLoad;
 
 impl Effect for ExternalLoad {

@@ -4,11 +4,11 @@ use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Lift slope and induced drag that change towards the ground.
+/// Lift slope that increases and induced drag that decreases towards the ground.
 ///
-/// A model has the altitude above sea level but not the terrain. The ground's altitude is therefore a constant of the
-/// effect, which is valid over flat ground such as an airfield. The effect vanishes a few spans above the ground. The logs
-/// of this program contain no height above ground.
+/// A model knows the altitude above sea level but not the terrain. The ground's altitude `ground_m` is therefore a constant
+/// of the effect, and the effect is valid over flat ground such as an airfield. `ground_m` must be given, because logs
+/// contain no height above ground. The effect vanishes a few spans above the ground.
 pub struct GroundEffect;
 
 impl Effect for GroundEffect {

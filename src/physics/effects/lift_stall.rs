@@ -7,7 +7,7 @@ use crate::{Channel, Point};
 /// Loss of lift beyond the stall, with the transition of \[BM12\] section 4.2.
 pub struct LiftStall;
 
-/// Computes e^(x · sharpness). It is a function because a closure would prevent the vectorisation of a kernel.
+/// Computes e^(x · sharpness), with the exponent limited to ±40. A closure in its place would prevent vectorisation.
 #[inline(always)]
 fn power<R: Real>(x: R, sharpness: f64) -> R {
     x.scale(sharpness).clamp(-40.0, 40.0).exp()
@@ -50,8 +50,8 @@ impl Effect for LiftStall {
     fn basis<R: Real>(at: &Point<R>, own: Own, terms: &mut impl Terms<R>) {
         let &[alpha0, sharpness] = own.shape else { return };
         let alpha = at.state.alpha;
-        // σ = (1 + e^−M(α−α0) + e^M(α+α0)) / ((1 + e^−M(α−α0)) (1 + e^M(α+α0))), with limited exponents, which keep the
-        // exponential finite in f32
+        // σ = (1 + e^−M(α−α0) + e^M(α+α0)) / ((1 + e^−M(α−α0)) (1 + e^M(α+α0))); `power` limits the exponents, so that the
+        // exponentials are finite in f32
         let above = power(R::from_f64(alpha0) - alpha, sharpness);
         let below = power(R::from_f64(alpha0) + alpha, sharpness);
         let one = R::from_f64(1.0);

@@ -1,8 +1,8 @@
-//! Physical effects, each a group of forces or moments in its own file.
+//! Physical effects. Each effect is a group of forces or moments and has its own file.
 //!
-//! A new effect needs a file in this folder and its name in the list at the end of this file. It is then part of models,
-//! trim, linearisation, the planner, the parameter files, the search for missing effects and the report under its id.
-//! Effects between actuator positions and acting deflections are in [`inputs`](crate::inputs).
+//! A new effect needs a file in this folder and its name in the list at the end of this file. Its id is then available in
+//! models, trim, linearisation, the planner, the parameter files, the search for missing effects and the report. Effects
+//! between actuator positions and acting deflections are in [`inputs`](crate::inputs).
 
 use crate::formula::{Written, register};
 use crate::rigid_body::RigidBody;
@@ -20,7 +20,7 @@ pub struct Coefficient {
     pub unit: &'static str,
     /// Range of physically possible values.
     pub bounds: (f64, f64),
-    /// Whether `bounds` grow for an aircraft larger than 25 kg or 5 m. See [`Size`](crate::size::Size).
+    /// Whether `bounds` are wider for an aircraft of more than 25 kg or 5 m of span. See [`Size`](crate::size::Size).
     pub grows: bool,
 }
 
@@ -47,7 +47,8 @@ const AERODYNAMIC: [Channel; 6] =
 
 /// Inputs of an effect in addition to the point of evaluation.
 ///
-/// Effects that need more than the point are evaluated after the others. They receive the sum of the others.
+/// Effects that need more than the point are evaluated after the others. They receive the summed forces and moments of the
+/// others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Needs {
     /// Only the state, the controls and the airflow.
@@ -56,11 +57,11 @@ pub enum Needs {
     Base,
     /// Also [`Base::deflected`](crate::point::Base::deflected) and [`Base::still`](crate::point::Base::still).
     Parts,
-    /// Also the state's rate, [`Base::rate`](crate::point::Base::rate).
+    /// Also the time derivative of the state, [`Base::rate`](crate::point::Base::rate).
     Rate,
 }
 
-/// Data of one effect of one model.
+/// Data that a model holds for one of its effects.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Own<'a> {
     /// Table of the effect. It is present exactly if [`Effect::TABLE`] is.
@@ -203,8 +204,8 @@ macro_rules! effects {
                 }
             }
 
-            /// [`Effect::basis`] of this effect if it needs only the point. Otherwise it adds nothing. A sum over independent
-            /// effects then contains no code of the others, which halves the computation time of a planner.
+            /// [`Effect::basis`] of this effect if it needs only the point. Otherwise it adds nothing. A sum over these
+            /// effects then contains no code of the dependent ones, which halves the computation time of a planner.
             #[inline(always)]
             pub fn independent_basis<R: Real>(
                 self,

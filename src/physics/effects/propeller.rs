@@ -7,9 +7,9 @@ use crate::{Channel, Point};
 
 /// Thrust of a motor with a propeller, as a second-degree polynomial in throttle and airspeed.
 ///
-/// The voltage is proportional to the throttle. The torque balance of a motor and a propeller with quadratic CT(J) and CQ(J)
-/// gives a thrust that this polynomial reproduces to 0.2 N over the envelope of an Aerosonde. It includes the drag of a
-/// windmilling propeller: at low throttle the thrust is negative.
+/// The motor's voltage is taken as proportional to the throttle. The torque balance of a motor and a propeller with
+/// quadratic CT(J) and CQ(J) then gives a thrust that this polynomial reproduces to 0.2 N over the envelope of an
+/// Aerosonde. The polynomial includes the drag of a windmilling propeller: at low throttle the thrust is negative.
 pub struct Propeller;
 
 impl Effect for Propeller {

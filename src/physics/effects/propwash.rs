@@ -4,7 +4,7 @@ use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coeffici
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Throttle in level flight of the X8 at 16.67 m/s, 0..1. At this throttle the model's effectiveness is unchanged.
+/// Throttle at which the effectiveness equals the model's, 0..1: that of the X8 in level flight at 16.67 m/s.
 const THROTTLE0: f64 = 0.118;
 
 /// Effectiveness of aileron and elevator that grows with throttle.

@@ -4,7 +4,7 @@ use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point, State};
 
-/// Airspeed of the neutral start, m/s. At this airspeed the thrust is unchanged.
+/// Airspeed at which the thrust is unchanged, m/s: that of `State::NEUTRAL`.
 const V0: f64 = State::NEUTRAL.airspeed;
 
 /// Change of thrust that is linear in airspeed, as for a fixed-pitch propeller.

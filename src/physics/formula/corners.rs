@@ -8,10 +8,11 @@ use crate::point::Base;
 use crate::rigid_body::ForceAxes;
 use crate::{AirData, Channel, Controls, Point, State};
 
-/// Number of variables up to which all corners are tried. With more variables the number of corners does not grow.
+/// Number of variables up to which all corners of the variables' ranges are tried. A formula with more variables is tried
+/// at no more corners.
 const ALL_CORNERS: usize = 12;
 
-/// Whether all terms that it received are finite.
+/// Receives terms and records whether all of them are finite.
 struct Finite(bool);
 
 impl Terms<f64> for Finite {
@@ -20,9 +21,10 @@ impl Terms<f64> for Finite {
     }
 }
 
-/// Rejects an effect that is not finite at some point. The points are at the ends and in the middle of its variables' ranges,
-/// and at zero. The shape constants have the values of the file, then one of them at a time is at a bound, which a fit may
-/// reach.
+/// Checks that an effect is finite where its variables are at the ends of their ranges, in the middle, and at zero.
+///
+/// The shape constants first have the values of the file. The check is then repeated with each of them in turn at each of
+/// its bounds, because a fit may reach a bound.
 ///
 /// # Errors
 /// If a term is not finite. The error names the point and the remedy.
@@ -42,12 +44,12 @@ pub fn check(effect: &Written) -> Result<(), String> {
     Ok(())
 }
 
-/// Checks all points with given shape constants.
+/// Checks all these points with given shape constants.
 fn everywhere(effect: &Written, shape: &[f64]) -> Result<(), String> {
     let variables = effect.variables();
     let tried = 1usize << variables.len().min(ALL_CORNERS);
     for corner in 0..tried {
-        // one bit per variable, where variables after the twelfth share the bits of the first ones
+        // bit k of `corner` selects the end of variable k's range; variables 13, 14, … use the bits of variables 1, 2, …
         let side = |k: usize| corner >> (k % ALL_CORNERS) & 1;
         try_at(effect, shape, &variables, |k, v| v.range()[side(k)])?;
     }
@@ -81,7 +83,7 @@ fn try_at(
     ))
 }
 
-/// A point whose variables can be set individually.
+/// A point of evaluation whose variables can be set individually.
 struct Place {
     state: State,
     controls: Controls,

@@ -56,7 +56,7 @@ impl Dimension {
     /// Parses a unit such as `N m`, `1/rad²`, `kg m^2` or `m/s`. An empty text is dimensionless.
     ///
     /// # Errors
-    /// If a part is not one of the SI units of the list, or its exponent is not a whole number from −8 to 8.
+    /// If a part of the text is not one of the SI units known here, or its exponent is not a whole number from −8 to 8.
     pub fn parse(text: &str) -> Result<Dimension, String> {
         let mut dimension = Dimension::NONE;
         let (mut sign, mut rest) = (1, text.trim());

@@ -20,7 +20,7 @@ pub enum Node {
     Number(f64),
     /// A variable of the flight, for example α.
     Variable(Variable),
-    /// A parameter, as its index in the effect's list.
+    /// A parameter, given by its index in the effect's list of parameters.
     Parameter(usize),
     /// A function or operator with its arguments.
     Call(Function, Vec<Expression>),
@@ -93,7 +93,7 @@ impl Function {
         matches!(self, Function::Lag | Function::Delay)
     }
 
-    /// Whether its value or its slope is discontinuous.
+    /// Whether the function or its slope is discontinuous at some argument.
     pub fn has_kink(self) -> bool {
         use Function::{Abs, Deadband, Max, Min, Sign};
         matches!(self, Abs | Min | Max | Sign | Deadband)
@@ -112,7 +112,7 @@ impl Expression {
         Expression { node: Node::Call(function, arguments), at }
     }
 
-    /// The product of two expressions, without a factor of one.
+    /// The product of two expressions. A factor that is the number 1 is omitted.
     pub fn times(self, other: Expression) -> Expression {
         let one = |e: &Expression| e.node == Node::Number(1.0);
         match (one(&self), one(&other)) {

@@ -1,4 +1,4 @@
-//! Reader of effect files: TOML, with one effect per file.
+//! Reader of effect files. An effect file is a TOML file with one effect.
 
 use std::collections::BTreeMap;
 
@@ -24,7 +24,7 @@ use crate::inputs;
 const LONGEST_NAME: usize = 40;
 /// Largest number of parameters of an effect.
 const MOST_PARAMETERS: usize = 16;
-/// Default prior width, as a fraction of the range between a parameter's bounds.
+/// Default prior standard deviation, as a fraction of the range between a parameter's bounds.
 const WIDTH: f64 = 0.25;
 
 #[derive(Deserialize)]
@@ -49,7 +49,7 @@ struct Parameter {
     value: f64,
     width: Option<f64>,
     bounds: [f64; 2],
-    /// Whether the bounds grow for an aircraft larger than 25 kg or 5 m, like the bounds of the catalogue.
+    /// Whether the bounds are wider for an aircraft of more than 25 kg or 5 m of span, like the bounds of the catalogue.
     #[serde(default)]
     grows: bool,
     unit: String,
@@ -258,7 +258,8 @@ fn built(
     })
 }
 
-/// Replaces the indices of parameters by their indices among the coefficients.
+/// Replaces each parameter's index in the file by its index among the coefficients. `order` lists the parameters in the
+/// order of the coefficients.
 fn renumber(of: &mut Expression, order: &[usize]) {
     match &mut of.node {
         Node::Parameter(k) => *k = order.iter().position(|o| o == k).unwrap_or_default(),
@@ -268,7 +269,7 @@ fn renumber(of: &mut Expression, order: &[usize]) {
     }
 }
 
-/// Rejects a term whose dimension differs from that of its channel.
+/// Checks that the term `factor` · `part` · parameter `name` has the dimension of its channel.
 fn balance(
     channel: Channel,
     factor: Option<Dimension>,
@@ -354,7 +355,7 @@ fn description(
     }
 }
 
-/// The lines as text, separated by semicolons.
+/// The formula of the effect as text: its lines, separated by semicolons.
 fn formula(lines: &[Line], names: &[&str]) -> String {
     let one = |line: &Line| {
         let (factor, shape) = (line.factor.written(names), line.shape.written(names));
@@ -366,8 +367,11 @@ fn formula(lines: &[Line], names: &[&str]) -> String {
     lines.iter().map(one).collect::<Vec<_>>().join("; ")
 }
 
-/// Starting points of a search over shape constants: the values of the file, and each constant one width lower or higher.
-/// A coefficient of zero starts at its width, because shape constants have no effect without it.
+/// Starting points of a search over shape constants: the values of the file, then each constant in turn one prior standard
+/// deviation lower and higher, then the same points with reversed signs of the coefficients.
+///
+/// A coefficient that is zero in the file starts at its prior standard deviation, because shape constants have no effect if
+/// it is zero.
 fn starts(
     parameters: &[&Parameter],
     linear: usize,
@@ -381,7 +385,7 @@ fn starts(
     for k in 0..linear {
         if first[k] == 0.0 {
             let [low, high] = parameters[k].bounds;
-            // towards the bound with the larger distance from zero
+            // in the direction of the bound that is farther from zero
             first[k] = if high >= -low { widths[k].min(high) } else { (-widths[k]).max(low) };
         }
     }

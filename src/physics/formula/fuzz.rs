@@ -1,4 +1,4 @@
-//! Fuzz test of the reader of effect files: thousands of broken files, of which none may cause a panic.
+//! Fuzz test of the reader of effect files: none of thousands of broken files may cause a panic.
 
 use rand::RngExt;
 
@@ -46,7 +46,7 @@ pub fn run(count: usize, seed: u64, observe: &mut dyn FnMut(&str, &Result<(), St
     good
 }
 
-/// The file with a random factor and shape.
+/// `WHOLE` with a random factor and shape.
 fn grown(random: &mut Stream) -> String {
     let depth = random.random_range(0..7);
     let shape = format!("k*({})", term(random, depth));
@@ -84,7 +84,7 @@ fn pick<T: Copy>(random: &mut Stream, all: &[T]) -> T {
     all[random.random_range(0..all.len() as u32) as usize]
 }
 
-/// The file with characters removed, inserted or copied at random.
+/// `WHOLE` with characters removed, inserted or copied at random.
 fn damaged(random: &mut Stream) -> String {
     const ODD: [&str; 24] = [
         "(",

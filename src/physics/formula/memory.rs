@@ -69,7 +69,7 @@ impl Memory {
     }
 }
 
-/// Rejects a lag or delay in `of` that cannot be evaluated. `bounds` are the bounds of the effect's parameters.
+/// Checks that every lag and delay in `of` can be evaluated. `bounds` are the bounds of the effect's parameters.
 ///
 /// # Errors
 /// If a lag or delay has an invalid argument or time. The error has the position in the text, and the remedy.
@@ -103,7 +103,8 @@ fn refusal(function: Function, all: &[Expression], bounds: &[[f64; 2]]) -> Optio
             other.name()
         ));
     }
-    // a number in the formula has no bounds, and effects without a shape constant share one model in a search
+    // A number has no bounds. A search also adds all effects without a shape constant to one model, which would then have
+    // too many lags.
     let Node::Parameter(k) = time.node else {
         return Some(format!("the time of {name} must be a parameter in s, so that it has bounds"));
     };

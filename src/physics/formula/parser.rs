@@ -65,7 +65,7 @@ impl Parser<'_> {
         &self.text[self.at..]
     }
 
-    /// The next character that is not a space.
+    /// Skips spaces and returns the next character without consuming it.
     fn peek(&mut self) -> Option<char> {
         let rest = self.rest();
         self.at += rest.len() - rest.trim_start().len();

@@ -1,8 +1,8 @@
 //! Registry of effects from files: shipped effects, and effects that this process has read.
 //!
-//! An effect of a file is found by its id, like an effect of the catalogue. Both live as long as the process. A file that
+//! An effect of a file is found by its id, like an effect of the catalogue. It is kept until the process ends. A file that
 //! is read again gives the same effect. If the file was edited in between, the new effect replaces the earlier one for
-//! later look-ups. Models that were loaded before keep the earlier effect.
+//! later look-ups, and models that were loaded before keep the earlier effect.
 
 use std::path::{Path, PathBuf};
 use std::sync::{LazyLock, PoisonError, RwLock};

@@ -1,14 +1,15 @@
-//! Division of a formula into the factor of each coefficient.
+//! Splitting of a formula that is linear in its coefficients into the factor of each coefficient.
 
 use super::expression::{Expression, Function, Node};
 use super::parser::Fault;
 
-/// Parts of a formula: each parameter in which the formula is linear, as its index, with the factor of this parameter.
+/// The index of each parameter in which a formula is linear, with the expression that the parameter multiplies.
 pub type Parts = Vec<(usize, Expression)>;
 
-/// Marks the parameters, of which there are `count`, in which all of `formulas` are linear. Such a parameter occurs in no
-/// function, in no denominator and in no product with another of them. In a product of parameters the leftmost stays
-/// linear.
+/// For each of `count` parameters, whether all of `formulas` are linear in it.
+///
+/// A formula is not linear in a parameter of a function or a denominator. In a product of parameters, only the leftmost one
+/// counts as linear.
 pub fn linear(formulas: &[Expression], count: usize) -> Vec<bool> {
     let mut linear = vec![true; count];
     loop {
@@ -57,7 +58,7 @@ fn bend(of: &Expression, linear: &mut [bool]) {
 /// The factor in `formula` of each parameter that `linear` marks.
 ///
 /// # Errors
-/// If a term contains no such parameter. Without one the effect could not be zero.
+/// If a term contains no marked parameter. Such a term could not be made zero by a coefficient.
 pub fn parts(formula: &Expression, linear: &[bool]) -> Result<Parts, Fault> {
     let mut all: Parts = Vec::new();
     for (parameter, part) in divided(formula, linear) {
@@ -79,7 +80,8 @@ pub fn parts(formula: &Expression, linear: &[bool]) -> Result<Parts, Fault> {
     Ok(all)
 }
 
-/// The terms of a sum, each with the index of the parameter that multiplies it. `None` if there is no such parameter.
+/// The terms of `of`, each without its marked parameter but with this parameter's index. The index is `None` if a term has
+/// no marked parameter.
 fn divided(of: &Expression, linear: &[bool]) -> Vec<(Option<usize>, Expression)> {
     if !holds(of, linear) {
         return vec![(None, of.clone())];
@@ -105,7 +107,7 @@ fn divided(of: &Expression, linear: &[bool]) -> Vec<(Option<usize>, Expression)>
         Node::Call(Function::Divide, all) => {
             each(&all[0], &|part| Expression::call(Function::Divide, vec![part, all[1].clone()]))
         }
-        // no other node contains a marked parameter, because `linear` has cleared its mark
+        // no other node contains a marked parameter: `mark` has cleared the marks of parameters in such nodes
         _ => vec![(None, of.clone())],
     }
 }

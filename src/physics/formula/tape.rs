@@ -1,7 +1,7 @@
 //! A formula compiled to a list of operations, generic over the scalar type.
 //!
-//! The list is the program of a stack machine whose top is kept in a register. With [`Dual`](greylag_num::Dual) numbers it
-//! gives the derivatives with respect to states and controls.
+//! The list is the program of a stack machine. The top value of the stack is kept outside the array of the others. With
+//! [`Dual`](greylag_num::Dual) numbers the program gives the derivatives with respect to states and controls.
 
 use super::expression::{Expression, Function, Node};
 use super::memory::Memory;
@@ -12,7 +12,8 @@ use greylag_num::{Real, Table};
 /// Largest number of values on the stack below the top.
 const DEPTH: usize = 12;
 
-/// Largest number of operations and multiplied variables of an effect. It limits the time of a model's step.
+/// Largest number of operations and multiplied variables, counted together, of an effect. It limits the computation time
+/// of a model's step.
 const LONGEST: usize = 4000;
 
 /// An operation of the stack machine.
@@ -37,22 +38,23 @@ enum Operation {
     Sqrt,
     Smoothstep,
     Deadband,
-    /// Replaces the top by the lag or delay with this index. If the past is unknown, the top remains: the settled value.
+    /// Replaces the top by the value of the lag or delay with this index. If the past is unknown, the top remains: it is
+    /// the argument's present value, and thus the steady-state value.
     Remembered(u16),
     Square,
     Power(i16),
     Table(u16),
-    /// Adds a number to the top. This operation and the next four do not use the stack.
+    /// Adds a number to the top. This operation and the next four use no value below the top.
     AddNumber(f64),
     Scale(f64),
     AddVariable(Variable),
     Times(Variable),
     /// Multiplies the top by the variables from the first index up to the second in the list of variables.
     TimesAll(u16, u16),
-    /// Stores the top as the factor that several parts share, and removes it.
+    /// Stores the top as the factor that several parts share, and removes it from the stack.
     Keep,
     TimesKept,
-    /// Reports the top and removes it.
+    /// Reports the top as the term of a coefficient (by its index) in a channel, and removes it from the stack.
     Report(u16, Channel),
 }
 
@@ -61,7 +63,7 @@ enum Operation {
 pub struct Tape {
     operations: Vec<Operation>,
     tables: Vec<Table>,
-    /// Variables of the products, in runs.
+    /// Variables of the products. Each `TimesAll` refers to a range of this list.
     variables: Vec<Variable>,
     memories: Vec<Memory>,
     depth: usize,
@@ -139,7 +141,7 @@ impl Tape {
         }
     }
 
-    /// Appends a product: first the factors other than variables, then all variables as a run, then the number.
+    /// Appends a product: first the factors other than variables, then all variables together, then the number.
     fn product(&mut self, of: &Expression, places: &Places) -> Result<(), String> {
         let mut factors = Vec::new();
         let number = factors_of(of, &mut factors);
@@ -220,7 +222,7 @@ impl Tape {
         if function.has_memory() {
             return self.remembered(function, all, places);
         }
-        // a number or variable is added directly, without a place on the stack
+        // a number or variable is added to the top directly, without being put on the stack
         if let ([left, right], F::Add) = (all, function) {
             for (leaf, other) in [(right, left), (left, right)] {
                 if let Some(direct) = direct(function, &leaf.node) {
@@ -288,8 +290,8 @@ impl Tape {
         &self.memories
     }
 
-    /// Evaluates the list at the point `at` with the shape constants `shape`, and reports the value of each part. The lags
-    /// of the list are the lags of the model from index `first_lag` on.
+    /// Evaluates the list at the point `at` with the shape constants `shape`, and calls `report` with the value of each part.
+    /// The values of the list's lags and delays are in `at.controls.lagged` from index `first_lag` on.
     #[inline(always)]
     pub fn run<R: Real>(
         &self,
@@ -374,7 +376,7 @@ impl Tape {
     }
 }
 
-/// Appends the factors of the product `of`, and returns the product of its constants.
+/// Appends the factors of the product `of` that are not numbers to `factors`, and returns the product of its numbers.
 fn factors_of<'a>(of: &'a Expression, factors: &mut Vec<&'a Expression>) -> f64 {
     match &of.node {
         Node::Number(x) => *x,
@@ -414,7 +416,7 @@ fn of_area(variables: &mut Vec<Variable>) {
     }
 }
 
-/// The operation that adds a number or variable directly. `None` for other terms.
+/// The operation that adds the number or variable `leaf` to the top directly. `None` for other terms.
 fn direct(function: Function, leaf: &Node) -> Option<Operation> {
     Some(match (function, leaf) {
         (Function::Add, Node::Number(x)) => Operation::AddNumber(*x),

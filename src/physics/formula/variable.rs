@@ -43,7 +43,7 @@ macro_rules! variables {
                 match self { $(Variable::$id => $dimension,)* }
             }
 
-            /// Range of the variable in the flight of any aircraft, in its unit. It is used to test formulas.
+            /// Range in which formulas are tested for finite values, in the variable's unit.
             pub const fn range(self) -> [f64; 2] {
                 match self { $(Variable::$id => [$low, $high],)* }
             }

@@ -24,7 +24,7 @@ pub enum Status {
 pub struct Line {
     /// Channel of the contribution.
     pub channel: Channel,
-    /// Factor by which the shape is multiplied.
+    /// Factor without parameters by which the shape is multiplied.
     pub factor: Expression,
     /// Sum of terms, each multiplied by a parameter.
     pub shape: Expression,
@@ -37,7 +37,7 @@ pub struct Written {
     pub about: Description,
     /// Acceptance status.
     pub status: Status,
-    /// Contributions to the channels. Parameters have the order of `about.coefficients`.
+    /// Contributions to the channels. Parameters are numbered in the order of `about.coefficients`.
     pub lines: Vec<Line>,
     /// Values of the coefficients in the file.
     pub values: Vec<f64>,
@@ -50,8 +50,8 @@ pub struct Written {
 }
 
 impl Written {
-    /// Inputs of the effect. They are never only the point, because a planner's sum over effects that need only the point must
-    /// contain no code of formulas.
+    /// Inputs of the effect, at least `Needs::Base`: a planner's sum over the effects that need only the point must contain
+    /// no code of formulas.
     pub const fn needs(&self) -> Needs {
         self.needs
     }
@@ -70,7 +70,7 @@ impl Written {
         self.tape.memories()
     }
 
-    /// Value of a coefficient in the file, with the effect's source and the prior standard deviation.
+    /// Value in the file of the coefficient at index `coefficient`, with the effect's source and the prior standard deviation.
     pub fn number(&self, coefficient: usize) -> Sourced {
         Sourced {
             bounds: None,
@@ -91,7 +91,7 @@ impl Written {
         Variable::ALL.iter().copied().filter(named).collect()
     }
 
-    /// Names of the effect's functions with a discontinuous value or slope, each once. Tables are included.
+    /// Names of the effect's functions whose value or slope is discontinuous, each once. Tables are included.
     pub fn kinks(&self) -> Vec<&'static str> {
         let mut all = Vec::new();
         let mut note = |e: &Expression| {

@@ -1,13 +1,13 @@
-//! Input effects between the actuators' measured positions and the acting deflections, each in its own file.
+//! Input effects: they act between the actuators' measured positions and the acting deflections. Each has its own file.
 //!
 //! Input effects have memory and are nonlinear in their constant. Several effects of one model act one after the other in
 //! the order of the list at the end of this file. A new effect needs a file in this folder and its name in that list.
 //!
-//! Input effects apply wherever a model is stepped: free runs, simulated flights and the planner. The planner does not
-//! observe the acting deflections and assumes surfaces and throttle at rest before its plan. Trim neglects input effects,
-//! of which only the dead zone would matter. The linear model, and thus the design of the LQI, neglects all of them. The
-//! LQI's integrators compensate their constant part. The cost of a lag or delay is measured in
-//! `tests/model/effects_lqi.rs`.
+//! Input effects apply wherever a model is stepped: open-loop simulations, simulated flights and the planner. The planner
+//! does not observe the acting deflections and assumes surfaces and throttle at rest before its plan. Trim neglects input
+//! effects; in steady flight only the dead zone would matter. The linear model, and thus the design of the LQI, neglects
+//! all of them. The LQI's integrators compensate constant errors caused by this. The cost of a lag or delay is measured
+//! in `tests/model/effects_lqi.rs`.
 
 use crate::Controls;
 use crate::actuators::LAGS;
@@ -49,8 +49,8 @@ pub trait InputEffect {
     /// Controls on which the effect acts.
     const ACTS: Acts = Acts::OnSurfaces;
 
-    /// Acting deflection (rad) or throttle (0 to 1) at the measured position `input`, with the effect's `constant`. To be
-    /// called once every [`STEP`].
+    /// Returns the acting deflection (rad) or throttle (0 to 1) for the measured position `input` and the effect's
+    /// `constant`. To be called once every [`STEP`].
     fn act<R: Real>(constant: f64, memory: &mut Past<R>, input: R) -> R;
 }
 
@@ -88,7 +88,7 @@ pub struct InputMemory<R = f64> {
 }
 
 impl<R: Real> InputMemory<R> {
-    /// Memory of surfaces and throttle at rest at `controls`. The arguments of lags and delays are at rest at `lagged`.
+    /// Memory of surfaces and throttle at rest at `controls`, and of lags and delays whose arguments are at rest at `lagged`.
     #[inline(always)]
     pub fn at_rest(controls: &Controls<R>, lagged: [R; LAGS]) -> Self {
         let Controls { aileron, elevator, throttle, .. } = *controls;
@@ -98,7 +98,7 @@ impl<R: Real> InputMemory<R> {
         }
     }
 
-    /// Selects the memory `then` where `chosen` is above zero, else this memory.
+    /// Selects `then` in the SIMD lanes in which `chosen` is above zero, and this memory in the others.
     pub fn replaced(&self, chosen: R, then: &Self) -> Self {
         let one = |old: R, new: R| R::where_less(R::zero(), chosen, new, old);
         let past = |old: &Past<R>, new: &Past<R>| Past {
@@ -115,7 +115,7 @@ impl<R: Real> InputMemory<R> {
         }
     }
 
-    /// Controls after the effect at index `place` (below [`MOST`]) of the model's list, for the controls `z` before it.
+    /// Applies the effect at index `place` (below [`MOST`]) of the model's list to the controls `z`, and returns the result.
     #[inline(always)]
     pub fn act(&mut self, place: usize, kind: Kind, constant: f64, z: &Controls<R>) -> Controls<R> {
         let [aileron, elevator, throttle] = &mut self.inputs[place];

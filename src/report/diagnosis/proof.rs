@@ -8,14 +8,16 @@ use crate::{Figure, Finding, Findings, Histogram, Rule, Section, Table};
 use greylag_sysid::compare::{Comparison, ModelResult};
 use greylag_sysid::diagnose::Diagnosis;
 
-/// Smallest evidence of a null flight that the histogram shows. Smaller values would stretch its logarithmic axis.
+/// Smallest evidence that the histogram shows. Smaller values of the surrogate data would stretch its logarithmic
+/// axis.
 const DRAWN: f64 = 0.1;
-/// Number of decoys in the table, in order of decreasing evidence.
+/// Number of decoys (placebo regressors) in the table, in order of decreasing evidence.
 const DECOYS: usize = 8;
 /// Preferred horizon for the error in the sentence, s; without it, the last horizon is used.
 const SHOWN_S: f64 = 5.0;
 
-/// Section on the evidence that arises by chance: in null flights (without a missing effect), and for decoys.
+/// Section on the evidence that arises by chance: in surrogate flights without a missing effect (nulls), and for
+/// placebo regressors (decoys).
 pub(crate) fn chance(d: &Diagnosis) -> Section {
     let mut figures = Vec::new();
     let best = d.effects.iter().find(|c| c.asserted).or(d.effects.first());

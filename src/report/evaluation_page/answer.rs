@@ -6,9 +6,9 @@ use greylag_sim::evaluation::{Evaluation, Score};
 
 /// Group over which controllers are ranked if the evaluation contains it.
 const ALL: &str = "all";
-/// Largest difference in the share of flights within the envelope that does not affect the ranking: one flight in twenty. A
-/// controller further below the largest share ranks behind the others: a small settled error does not compensate for a load
-/// factor beyond the limit.
+/// A controller ranks behind the others if its share of flights within the envelope is below the largest share by
+/// more than this: one flight in twenty. A small settled error does not compensate for a load factor beyond the
+/// limit.
 const KEPT_APART: f64 = 0.05;
 
 /// The evaluation that ranks first; `None` if there are no scores.

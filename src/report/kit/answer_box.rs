@@ -24,7 +24,8 @@ pub struct AnswerBox {
 pub enum First {
     /// The change of the error.
     Error,
-    /// The sentence on effects. It comes first if no effect is missing, because a reduction by tuning is then not the answer.
+    /// The sentence on missing effects. It comes first if no effect is missing, because a smaller error then comes
+    /// from re-estimation alone.
     Effect,
 }
 

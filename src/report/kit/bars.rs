@@ -97,7 +97,7 @@ mod tests {
         let html = bars.html();
         let widths: Vec<&str> =
             html.split("width:").skip(1).map(|w| w.split('%').next().unwrap()).collect();
-        // The values are cut at 100, NaN, negative, infinite; the last three give no bar.
+        // The first value is cut at 100. NaN, negative and infinite values give no bar.
         assert_eq!(widths, ["100.00", "0.00", "0.00", "0.00"]);
         assert!(html.contains("250 %") && html.contains("cannot be determined"));
     }

@@ -1,4 +1,4 @@
-//! Evidence for candidates: bars relative to the candidates' thresholds, in groups.
+//! Evidence for candidate effects (test statistics): bars relative to the candidates' thresholds, in groups.
 
 use crate::Style;
 use crate::kit::html::escape;

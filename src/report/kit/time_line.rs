@@ -9,12 +9,12 @@ use crate::kit::numbers::number;
 /// Height of a row of states and of a panel of curves, px.
 const ROW_PX: f64 = 26.0;
 const PANEL_PX: f64 = 84.0;
-/// Widths of the figure on a telephone and on a desktop screen, px, at which a word is drawn if it fits; and the width of a
-/// letter including its share of the margin, px.
+/// Widths of the figure on a telephone and on a desktop screen, px. A word is drawn on a screen if it fits there. A
+/// letter has the width `LETTER_PX`, px, including its share of the margin.
 const NARROW_PX: f64 = 330.0;
 const WIDE_PX: f64 = 800.0;
 const LETTER_PX: f64 = 8.0;
-/// Smallest width of a state, % of the figure, for the visibility of short states.
+/// Smallest drawn width of a state, % of the figure. It keeps short states visible.
 const SEEN: f64 = 0.6;
 /// Approximate number of horizontal grid lines in a panel.
 const LEVELS: f64 = 3.0;
@@ -172,7 +172,7 @@ impl TimeLine {
         if low > high {
             return String::new();
         }
-        // relative to the values as well: the range of a large constant must not vanish in rounding
+        // the margin is also relative to the values, because the range of a large constant would vanish in rounding
         let room = 0.08 * (high - low).max(1.0).max(1e-6 * low.abs().max(high.abs()));
         let range = [low - room, high + room];
         let key: String = match panel.lines.len() {

@@ -1,4 +1,4 @@
-//! The vehicle's end of the link: the shim, or a simulated flight controller.
+//! The vehicle's end of the link: the shim (the simulator's own MAVLink interface), or a simulated flight controller.
 
 use greylag_sitl::plant::{Inputs, PlantOptions, Truth};
 use greylag_sitl::shim::bench::Bench;
@@ -16,7 +16,7 @@ use greylag_model::GreyBox;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Counterpart {
-    /// The shim of the simulator.
+    /// The shim, the simulator's own MAVLink interface.
     Sitl,
     /// PX4, to which the companion commands surfaces.
     Px4,

@@ -36,10 +36,10 @@ use traced::Follower;
 
 /// Number of steps of a flight: 60 s.
 const STEPS: u64 = 6000;
-/// Time within which control must be returned on a dead link, s.
+/// Time within which control must be returned to the flight controller after the link has failed, s.
 const HAND_BACK_S: f64 = 0.5;
 
-/// Random stream for the suspensions by an overloaded processor.
+/// Id of the random stream for the suspensions by an overloaded processor.
 const STARVED: u64 = 20;
 
 /// Conditions of a flight.
@@ -47,7 +47,7 @@ const STARVED: u64 = 20;
 pub struct Case {
     /// Seed of all random numbers of the flight.
     pub seed: u64,
-    /// Name of the controller.
+    /// The companion's controller.
     pub controller: ControllerKind,
     /// The vehicle's end of the link.
     pub counterpart: Counterpart,
@@ -69,13 +69,13 @@ pub struct Report {
 /// A flight with its samples, texts and replies.
 #[derive(Clone, Debug)]
 pub struct Witnessed {
-    /// Samples at intervals of 10 ms. They end with a panic or on the ground.
+    /// Samples at intervals of 10 ms. They end early at a panic or at ground contact.
     pub samples: Vec<Sample>,
     /// The violated requirements.
     pub findings: Vec<Found>,
     /// Texts of the companion to the ground stations with their times, s.
     pub texts: Vec<(f64, String)>,
-    /// Requests of the client other than setpoints, with the replies and times, s.
+    /// Times (s) of the client's requests other than setpoints, with the requests and the replies.
     pub answers: Vec<(f64, Asking, Verdict)>,
 }
 
@@ -123,9 +123,9 @@ impl CompanionFactory {
         Ok(Desk::new(companion, vehicle(counterpart, &self.model)))
     }
 
-    /// Flies `case`. A panic of the companion is a finding. A finding on the aircraft is attributed to a cause if the
-    /// aircraft was exposed to this cause, and if the finding vanishes when the flight is repeated without the faults
-    /// that produce the cause. The cause is `Cause::Itself` if the finding remains without any faults.
+    /// Flies `case`. A panic of the companion is a finding. A finding on the aircraft is attributed to a cause under two
+    /// conditions: the aircraft was exposed to this cause, and the finding vanishes when the flight is repeated without
+    /// the faults that produce the cause. The cause is `Cause::Itself` if the finding remains without any faults.
     ///
     /// # Errors
     ///
@@ -224,7 +224,7 @@ impl CompanionFactory {
             texts: Vec::new(),
             answers: Vec::new(),
         };
-        // after a panic the judge only reads the state of the flight
+        // after a panic only the judge, the samples and the texts of the flight are used
         if catch_unwind(AssertUnwindSafe(|| flight.fly())).is_err() {
             let at_s = flight.judge.now_s();
             flight.judge.note(at_s, Finding::Panic);
@@ -267,7 +267,7 @@ struct Flight {
     cruise: f64,
     random: ChaCha8Rng,
     disk: Option<Disk>,
-    /// The companion is not scheduled before this step.
+    /// Step before which the companion is suspended.
     asleep_until: u64,
     /// Bytes that have arrived since the companion last ran.
     unread: Vec<Vec<u8>>,
@@ -279,7 +279,8 @@ struct Flight {
     /// Whether the companion is killed at present. `spares` are its successors.
     killed: bool,
     spares: Vec<Desk>,
-    /// Time since which nothing has arrived while the companion controls through a flight controller, s.
+    /// Start of the interval in which nothing has arrived while the companion controls through a flight controller, s.
+    /// `None` outside such an interval.
     dead_since: Option<f64>,
     texts: Vec<(f64, String)>,
     answers: Vec<(f64, Asking, Verdict)>,
@@ -353,7 +354,7 @@ impl Flight {
         self.texts.extend(self.desk.texts.drain(..).map(|text| (now_s, text.words)));
     }
 
-    /// Checks that control is returned within half a second on a dead link.
+    /// Checks that control is returned to the flight controller within half a second after the link has failed.
     fn watch_link(&mut self, now_s: f64, heard: bool) {
         let real = matches!(self.aircraft, Aircraft::Real(_));
         let engaged = match self.desk.vehicle() {

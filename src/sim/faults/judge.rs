@@ -17,12 +17,12 @@ pub(super) const ABOVE_STALL: f64 = std::f64::consts::SQRT_2;
 const ALTITUDE_LOSS_M: f64 = 200.0;
 /// Largest accepted roll error at the end, degrees. Twice this error is accepted in pitch.
 const RECOVERED_DEG: f64 = 3.0;
-/// Rounding tolerance of a surface step, −1..1 being the travel.
+/// Rounding tolerance for the change of a surface command in one step, where the command is −1..1.
 const ROUNDING: f64 = 1e-9;
 /// Number of steps with constant actuators after which the aircraft counts as uncommanded: 0.2 s.
 const UNSTEERED: u32 = 20;
-/// Steps of 10 ms after which an exposure no longer explains a finding. Bank and pitch recover within 0.5 s of regained
-/// control and have the shorter limit. Airspeed and altitude take longer.
+/// Number of 10 ms steps after which an exposure no longer explains a finding. Airspeed and altitude take long to recover.
+/// Bank and pitch recover within 0.5 s after control is regained and have the shorter limit `MEMORY_OF_ATTITUDE`.
 const MEMORY: u64 = 300;
 const MEMORY_OF_ATTITUDE: u64 = 100;
 
@@ -66,11 +66,11 @@ pub struct Exposure {
 /// Cause of a finding on the aircraft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Cause {
-    /// No command arrived for at least 0.2 s, within the last 3 s (within 1 s for bank and pitch).
+    /// At some time in the last 3 s (1 s for bank and pitch) no command had arrived for at least 0.2 s.
     Unsteered,
-    /// The state was unusable within these times, at a vehicle that cannot fly by itself.
+    /// At some time in the same interval no state was usable, and the vehicle cannot fly by itself.
     Blind,
-    /// A sensor showed a plausible wrong value within these times.
+    /// At some time in the same interval a sensor showed a plausible wrong value.
     Misled,
     /// No fault is the cause: the same flight without faults has the finding too.
     Itself,
@@ -119,7 +119,7 @@ pub struct Found {
     pub finding: Finding,
     /// Established cause. `None` if no cause is established, and for findings on the companion.
     pub cause: Option<Cause>,
-    /// Possible causes, from the times of the exposures alone.
+    /// Possible causes, judged only by the times of the exposures.
     pub suspects: [Option<Cause>; 3],
 }
 
@@ -138,7 +138,7 @@ impl Finding {
         Finding::Unreported,
     ];
 
-    /// Whether the finding concerns the companion itself. This finding is never attributed to a cause.
+    /// Whether the finding concerns the companion itself. Such a finding is never attributed to a cause.
     pub fn is_own(self) -> bool {
         use Finding::*;
         matches!(self, Panic | Command | Slew | SlowHandBack | Unreported)
@@ -178,7 +178,7 @@ pub struct Judge {
 }
 
 impl Judge {
-    /// Starts the check of a flight of an aircraft with `envelope`.
+    /// A check of one flight of an aircraft with `envelope`, without findings.
     pub fn new(envelope: Envelope) -> Self {
         Judge {
             envelope,

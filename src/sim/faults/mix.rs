@@ -47,7 +47,7 @@ pub enum FaultKind {
     Starvation,
     /// The disk is full, and recording ends.
     Disk,
-    /// The companion is killed. When the fault ends, another one starts without its state.
+    /// The companion is killed. When the fault ends, another companion starts without the state of the first.
     Killed,
 }
 

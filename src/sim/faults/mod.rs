@@ -2,7 +2,7 @@
 //! are checked automatically.
 //!
 //! A case is a seed, a controller and a vehicle. [`CompanionFactory::fly`] flies a case for 60 s, in lockstep within
-//! this process. It uses the companion's pilot and vehicle link and the shim's aircraft.
+//! this process. It uses the companion's pilot and vehicle link, and the aircraft of the simulator's MAVLink shim.
 
 mod counterpart;
 mod flight;

@@ -1,4 +1,4 @@
-//! The flight rules in signal temporal logic: requirements that every flight must meet, under any faults.
+//! The flight rules in signal temporal logic. Every flight must meet these requirements, whatever its faults.
 
 use super::counterpart::ControllerMode;
 use super::judge::{ABOVE_STALL, OVERSHOOT_DEG};
@@ -9,7 +9,8 @@ use greylag_link::autopilot::Mode;
 use greylag_physics::Command;
 use greylag_physics::airframe::Envelope;
 
-/// Margins that count as a robustness of 1: angle (degrees), altitude (m), time (s).
+/// Margin of an angle that counts as a robustness of 1, degrees. `UNIT_M` and `UNIT_S` are the margins of an altitude (m)
+/// and of a time (s).
 const UNIT_DEG: f64 = 30.0;
 const UNIT_M: f64 = 100.0;
 const UNIT_S: f64 = 5.0;
@@ -17,20 +18,20 @@ const UNIT_S: f64 = 5.0;
 const ALTITUDE_LOSS_M: f64 = 400.0;
 /// Time for which violations are still excused after the aircraft was exposed ([`Sample::exposed`]), s.
 const MEMORY_S: f64 = 3.0;
-/// RMS of a surface's high-pass filtered deflection above which the surface oscillates; 1 is the maximum deflection.
+/// RMS of a surface's high-pass filtered command (−1..1) above which the surface counts as oscillating.
 const SWING: f64 = 0.5;
 /// Longest time for which a command may be held, s: 50 ms, and half a step (5 ms) for the arrival times of states.
 const HELD_S: f64 = 0.055;
-/// Time within which an attitude must be reached, s.
+/// Time within which a commanded attitude must be reached, s.
 const REACHED_S: f64 = 5.0;
 /// Age above which a decision is disregarded, s. An overloaded processor suspends the companion for a shorter time.
 const STALE_S: f64 = 0.5;
 /// Interval in which a repeated report is suppressed, s.
 const COMPLAINED_S: f64 = 5.0;
-/// Time within which an oscillation must end, s. The guard needs 1 s to detect an oscillation, and then returns
-/// control.
+/// Time within which an oscillation must end, s. The companion's oscillation guard needs 1 s to detect an oscillation, and
+/// then returns control.
 const SWING_S: f64 = 2.5;
-/// Rounding tolerance of a surface step (−1..1 being the travel) and of an envelope limit (degrees).
+/// Rounding tolerance for the change of a surface command (−1..1) in one step, and for an envelope limit (degrees).
 const ROUNDING: f64 = 1e-9;
 
 /// Sample of a flight at one step.
@@ -42,7 +43,7 @@ pub struct Sample {
     pub age_s: f64,
     /// Time for which the command has been held without a usable state, on the vehicle's clock, s.
     pub held_s: f64,
-    /// Largest change of a surface command since the last sample, −1..1 being the travel; 0 without a new decision.
+    /// Largest change of a surface command (−1..1) since the last sample; 0 without a new decision.
     pub moved: f64,
     /// Whether the flight controller executes the companion's commands. Always true for the simulator's shim.
     pub steered: bool,
@@ -54,8 +55,8 @@ pub struct Sample {
     pub silent_s: f64,
     /// Time since the client's last setpoint, s.
     pub client_silent_s: f64,
-    /// Time for which the companion has controlled to the same commanded attitude, s. Turbulence, an exposure, or a
-    /// fault of link, sensors, clock or processor resets it to 0.
+    /// Time for which the companion has held the same commanded attitude, s. Turbulence, an exposure, or a fault of link,
+    /// sensors, clock or processor resets this time to 0.
     pub steady_s: f64,
     /// Roll and pitch angle, degrees.
     pub attitude_deg: [f64; 2],
@@ -63,8 +64,8 @@ pub struct Sample {
     pub airspeed_mps: f64,
     /// Altitude loss since the start, m.
     pub lost_m: f64,
-    /// RMS, over about 1 s, of the high-pass filtered deflection of the more active of aileron and elevator, −1..1
-    /// being the travel. Surfaces that the companion does not command are excluded.
+    /// RMS over about 1 s of the high-pass filtered commands (−1..1) of aileron and elevator; the larger of the two.
+    /// Surfaces that the companion does not command are excluded.
     pub swing: f64,
     /// Whether the aircraft is exposed to a condition that its companion cannot prevent: no command arrives, no state
     /// is usable, or a sensor is wrong.
@@ -143,7 +144,7 @@ fn near(most: f64) -> Rule {
     Formula::atom(move |s: &Sample| s.error_deg().map_or(1.0, |e| (most - e) / most))
 }
 
-/// The companion has controlled to the same attitude for less than `seconds`.
+/// The companion has held the same commanded attitude for less than `seconds`.
 fn steady_for_less(seconds: f64) -> Rule {
     Formula::atom(move |s: &Sample| (seconds - s.steady_s) / UNIT_S)
 }
@@ -159,8 +160,8 @@ fn ends(state: impl Fn(&Sample) -> bool + Copy + Send + Sync + 'static, seconds:
     is(state).implies(is(move |s| !state(s) || s.age_s > STALE_S).eventually(seconds))
 }
 
-/// The commanded angle (`of` the target, rad) is between the limits `ends` of the envelope, degrees. The rule holds while
-/// no attitude is commanded.
+/// The commanded angle, which `of` reads from the target (rad), lies between the limits that `ends` reads from the envelope
+/// (degrees). The rule holds while no attitude is commanded.
 fn target_inside(of: fn(&Target) -> f64, ends: fn(&Envelope) -> [f64; 2]) -> Rule {
     Formula::atom(move |s: &Sample| {
         let [least, most] = ends(&s.envelope);

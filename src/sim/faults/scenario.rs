@@ -11,7 +11,7 @@ use greylag_link::autopilot::Mode;
 
 /// Largest number of faults, and of requests, in a random scenario.
 const MOST: usize = 4;
-/// Largest horizontal wind component, m/s, and largest turbulence curve of MIL-F-8785C, in a random scenario.
+/// Largest horizontal wind component in a random scenario, m/s. `TURBULENCE` is its largest turbulence curve of MIL-F-8785C.
 const WIND_MPS: f64 = 8.0;
 const TURBULENCE: u8 = 4;
 
@@ -49,7 +49,7 @@ pub enum Asking {
     Disarm,
     /// The client requests arming.
     Arm,
-    /// A ground station sets the flight controller's loiter mode. The request has no effect at the shim.
+    /// A ground station sets the flight controller's loiter mode. The shim ignores the request, because it has no modes.
     TakeOver,
 }
 
@@ -95,8 +95,8 @@ pub struct ControllerSetting {
 /// Values of flight-controller parameters.
 type Values = [(&'static str, &'static [f64])];
 
-/// PX4 parameters that are varied, with their values: suitable values, unsuitable values and PX4's defaults. The
-/// companion must refuse values with which it cannot fly safely.
+/// PX4 parameters that are varied, with their values. Some values are suitable, some are unsuitable, and some are PX4's
+/// defaults. The companion must refuse values with which it cannot fly safely.
 const PX4_SETTINGS: &Values = &[
     ("COM_RC_IN_MODE", &[0.0, 1.0, 2.0, 3.0, 4.0]),
     ("COM_RC_LOSS_T", &[0.1, 0.5, 1.0, 5.0]),
@@ -198,8 +198,8 @@ impl Scenario {
     /// Checks a scenario from a file.
     ///
     /// # Errors
-    /// The legs are not in the order of time. The client flies the last leg of the list that has started, so a leg with an
-    /// earlier one after it would never be flown.
+    /// If the legs are not in the order of time. The client flies the last leg of the list that has started. A leg that
+    /// precedes an earlier one in the list would therefore never be flown.
     pub fn check(&self) -> Result<(), String> {
         match self.legs.windows(2).find(|pair| pair[1].from_s < pair[0].from_s) {
             Some([before, after]) => Err(format!(
@@ -276,8 +276,8 @@ impl Scenario {
         self.controller_parameters.push(ControllerSetting { name: name.into(), value });
     }
 
-    /// All simplifications of the scenario by one change. A fault, a request or a parameter is removed, the wind or the
-    /// turbulence is removed, the legs become the default ones, or the duration of a fault is halved.
+    /// All scenarios that are simpler than this one by a single change. The change removes a fault, a request, a parameter,
+    /// the wind or the turbulence, restores the default legs, or halves the duration of a fault.
     pub fn smaller(&self) -> Vec<Scenario> {
         let mut all = Vec::new();
         let mut with = |change: &dyn Fn(&mut Scenario)| {

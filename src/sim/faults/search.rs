@@ -1,5 +1,6 @@
-//! Search for flights that violate a flight rule. A new flight is a variation of one that came close to a violation (PGFuzz,
-//! Kim et al., NDSS 2021), or is drawn at random. A flight with a violation is reduced to what the violation requires.
+//! Search for flights that violate a flight rule. A new flight is a variation of an earlier flight that came close to a
+//! violation (PGFuzz, Kim et al., NDSS 2021), or is drawn at random. A flight with a violation is simplified as long as the
+//! violation remains.
 
 use std::ops::ControlFlow;
 
@@ -18,11 +19,11 @@ use greylag_num::stream::stream;
 /// Number of flights per round, which run in parallel. The number is fixed to make the result independent of the number
 /// of cores.
 const TOGETHER: u64 = 16;
-/// Fraction of flights that are drawn at random instead of varied.
+/// Fraction of the flights that are drawn at random. The others are variations of earlier flights.
 const FRESH: f64 = 0.25;
-/// Largest number of reduction steps of a flight.
+/// Largest number of simplifications of a flight.
 const ROUNDS: usize = 8;
-/// Random stream of the search.
+/// Id of the random stream of the search.
 const SEARCH: u64 = 61;
 
 /// The flight that came closest to the violation of a rule.
@@ -40,7 +41,7 @@ pub struct Nearest {
     pub distance: f64,
     /// Time of the smallest robustness within its flight, s.
     pub at_s: f64,
-    /// The flight with the smallest robustness, reduced if it violates the rule. `None` if the rule applied to no
+    /// The flight with the smallest robustness, simplified if it violates the rule. `None` if the rule applied to no
     /// flight.
     pub scenario: Option<Scenario>,
 }
@@ -60,7 +61,7 @@ pub fn distances(
     Ok(judged(rules, scenario.counterpart, &samples, &found))
 }
 
-/// As [`distances`], from the samples and findings of a flight with `counterpart`.
+/// The results of [`distances`] for a flight with `counterpart` that has these samples and findings.
 pub fn judged(
     rules: &[Policy],
     counterpart: Counterpart,

@@ -120,7 +120,7 @@ fn together<S>(
     sum
 }
 
-/// Moving maximum of each value and the `before` values that precede it. `beyond` is the value before the first.
+/// Moving maximum over each value and the `before` values that precede it. Values before the first count as `beyond`.
 fn largest_of_the_last(values: &[f64], before: usize, beyond: f64) -> Vec<f64> {
     // indices with decreasing values; the first index has the maximum of the window
     let mut falling = VecDeque::<usize>::new();

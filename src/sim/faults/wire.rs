@@ -13,7 +13,7 @@ pub struct Wire {
 }
 
 impl Wire {
-    /// A link of the flight with `seed`. Each `direction` has its own random stream.
+    /// One `direction` of the link in the flight with `seed`. Each direction has its own random stream.
     pub fn new(seed: u64, direction: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(10 + direction);

@@ -1,4 +1,4 @@
-//! Effects of the imported model with their coefficients, from slopes and polar.
+//! Effects of the imported model, with coefficients from the measured derivatives and the polar.
 
 use super::fits::line;
 use super::propeller::Propeller;
@@ -83,11 +83,11 @@ pub(super) fn effects(
     all
 }
 
-/// Rate derivatives of lift and pitching moment below which they count as zero.
+/// The derivatives of lift and pitching moment with respect to α̇c/2V count as zero below this magnitude.
 const NO_RATE: f64 = 1e-3;
 
 impl Beside {
-    /// Adds the effects to `all`. Linear coefficients take their values without these effects.
+    /// Adds the effects to `all`. The linear coefficients are replaced by those that hold without these effects.
     fn put(&self, all: &mut Vec<Effect>) {
         let [lift, pitch] = [self.alpha_rate[2], self.alpha_rate[4]];
         if lift.abs() > NO_RATE || pitch.abs() > NO_RATE {

@@ -10,8 +10,8 @@ use greylag_model::textbook::{Estimate, incidence_limits, numbers};
 use greylag_num::{Grid, Table};
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY, standard_density};
 
-/// RMS deviation of the pitching moment from a line, as a fraction of its standard deviation, up to which only the line
-/// is written.
+/// Largest nonlinearity of the pitching moment for which only a straight line is written. It is the rms deviation from the
+/// line as a fraction of the moment's standard deviation.
 const STRAIGHT: f64 = 1e-3;
 
 /// Text of the airframe file.
@@ -55,7 +55,7 @@ pub(super) fn airframe(
     let incidence = polar.incidence(lift);
     let limits = incidence_limits(incidence, polar.incidence(lift_max));
     let descent = descent(subject, polar, thrust, [incidence, lift]);
-    // a glider's pitch limits are relative to its descent
+    // the pitch limits of a glider are relative to its descent angle
     let lowest = (5.0 * ((incidence - descent).to_degrees() / 5.0 - 2.0).floor()).min(-15.0);
     out += &format!(
         "[controls.throttle]\nlag_s = {{ value = {lag:.4}, source = \"step of the command\" }}\n\n{limits}\
@@ -68,7 +68,8 @@ pub(super) fn airframe(
     out
 }
 
-/// Descent angle at the reference airspeed with idle throttle, rad. Zero if full throttle holds level flight.
+/// Descent angle at the reference airspeed with idle throttle, rad. Zero if full throttle holds level flight. `alpha` and
+/// `lift` are the angle of attack (rad) and the lift coefficient of level flight.
 fn descent(subject: &Subject, polar: &Polar, thrust: &[Estimate], [alpha, lift]: [f64; 2]) -> f64 {
     let v = subject.start.airspeed_mps;
     let density = standard_density(subject.start.altitude_m);
@@ -154,8 +155,8 @@ fn thrust_table(table: &Grid) -> String {
     )
 }
 
-/// Tables of lift and drag over incidence. A third table holds the nonlinear part of the pitching moment if there is
-/// one.
+/// Tables of lift and drag over the angle of attack. A third table has the nonlinear part of the pitching moment, if it is
+/// not negligible.
 fn tables(polar: &Polar) -> String {
     let mut out = String::new();
     let [zero, slope, bent] = line(polar);

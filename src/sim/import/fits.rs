@@ -10,8 +10,8 @@ use greylag_physics::servos::{Surface, Travel};
 /// Range of the angle of attack in which the pitching moment is fitted by a line, degrees.
 const LINE_DEG: [f64; 2] = [-4.0, 10.0];
 
-/// Intercept and slope (1/rad) of the pitching moment coefficient over the angle of attack, and the rms residual as a
-/// fraction of its standard deviation.
+/// Intercept and slope (1/rad) of a line through the pitching moment coefficient over the angle of attack, and the rms
+/// residual as a fraction of the coefficient's standard deviation.
 pub(super) fn line(polar: &Polar) -> [f64; 3] {
     let [low, high] = LINE_DEG;
     let inside = |a: &f64| (low - 1e-6..=high + 1e-6).contains(&a.to_degrees());
@@ -54,7 +54,7 @@ pub(super) fn first_order(observed: &[f64]) -> f64 {
     let end = 0.5;
     match observed.iter().position(|x| *x >= 0.632 * end) {
         Some(k) => (0.01 * k as f64).max(0.01),
-        // 63 % was not reached: from the fraction of the step at the end of the observation
+        // 63 % was not reached: the time constant follows from the fraction of the step at the end of the observation
         None => {
             let last = observed.last().copied().unwrap_or(0.0) / end;
             if last < NO_ANSWER {
@@ -65,13 +65,13 @@ pub(super) fn first_order(observed: &[f64]) -> f64 {
     }
 }
 
-/// Range of thrust time constants that are tried, s: from one step to the largest value of the effect.
+/// Range of the time constants that are compared, s: from one step to the largest value of the effect `thrust_lag`.
 const THRUST_LAGS_S: [f64; 2] = [0.01, 10.0];
 /// Residual of a step response, as a fraction of the step, above which a first-order lag does not describe it.
 const NO_LAG: f64 = 0.5;
 /// Largest accepted ratio of the residual with the lag to that without a lag.
 const MUCH_BETTER: f64 = 0.8;
-/// Number of time constants tried, geometrically spaced.
+/// Number of geometrically spaced time constants that are compared.
 const THRUST_LAGS: usize = 400;
 
 /// First-order lag between throttle position and thrust.
@@ -85,8 +85,8 @@ pub(super) struct ThrustLag {
 }
 
 /// The lag that fits the step response `raised` best, validated on the response `waved` to a sine. Each response lists
-/// thrust (N) and throttle position after each `step` (s). The steady thrust is `slope` δ + `curve` δ² and a constant.
-/// `None` if the thrust does not change, or if the lag is at most two steps.
+/// thrust (N) and throttle position after each `step` (s). At the throttle position δ, the steady thrust is `slope` δ +
+/// `curve` δ² plus a constant. `None` if the thrust does not change, or if the lag is at most two steps.
 pub(super) fn thrust_lag(
     [raised, waved]: [&[[f64; 2]]; 2],
     step: f64,

@@ -1,13 +1,13 @@
-//! Lateral derivatives of the wing that depend on its lift coefficient.
+//! Lateral derivatives that depend on the lift coefficient, and aileron derivatives that depend on the angle of attack.
 
 use greylag_sitl::plant::{Inputs, PlantError, Start};
 
 use super::{ALPHA, ANGLE, COMMAND, RATE, Subject};
 
-/// Relative change between two incidences up to which a derivative counts as constant.
+/// A derivative counts as constant if its relative change between two angles of attack is below this value.
 const CONSTANT: f64 = 0.02;
 
-/// Derivatives linear in the lift coefficient.
+/// Lateral derivatives as linear functions of the lift coefficient.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WithLift {
     /// Clr, Clβ, Cnp, Cnβ at zero lift.
@@ -16,7 +16,7 @@ pub(super) struct WithLift {
     pub(super) by_lift: [f64; 4],
 }
 
-/// Rolling and yawing moment of the aileron at zero incidence, 1/rad, and their slopes over incidence, 1/rad².
+/// The derivatives Clδa and Cnδa at zero angle of attack, 1/rad, and their slopes over the angle of attack, 1/rad².
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AileronOverIncidence {
     pub(super) without: [f64; 2],
@@ -24,8 +24,8 @@ pub(super) struct AileronOverIncidence {
 }
 
 impl Subject<'_> {
-    /// Clδa and Cnδa from two incidences. `unit` is the aileron deflection (rad) at [`COMMAND`]. `None` if the
-    /// derivatives are nearly equal at both incidences.
+    /// Clδa and Cnδa from two angles of attack. `unit` is the aileron deflection (rad) at [`COMMAND`]. `None` if the
+    /// derivatives are nearly equal at both angles.
     pub(super) fn aileron_over_incidence(
         &mut self,
         unit: f64,
@@ -45,7 +45,8 @@ impl Subject<'_> {
         Ok(changes.then_some(AileronOverIncidence { without, by_incidence }))
     }
 
-    /// Clr, Clβ, Cnp and Cnβ from two incidences. `None` if the derivatives or the lift coefficients are nearly equal.
+    /// Clr, Clβ, Cnp and Cnβ from two angles of attack. `None` if the derivatives or the lift coefficients are nearly equal at
+    /// both angles.
     pub(super) fn lateral_with_lift(&mut self) -> Result<Option<WithLift>, PlantError> {
         let mut at = [[0.0; 5]; 2];
         for (own, sign) in at.iter_mut().zip([-1.0, 1.0]) {
@@ -73,7 +74,7 @@ impl Subject<'_> {
         let most = |k: [usize; 2]| {
             k.map(|k| low[k].abs().max(high[k].abs())).into_iter().fold(0.0, f64::max)
         };
-        // roll due to yaw rate and yaw due to roll rate have one scale, as have the moments due to sideslip
+        // Clr and Cnp are compared with one scale, Clβ and Cnβ with another
         let scale = [most([0, 2]), most([1, 3]), most([0, 2]), most([1, 3])];
         let changes = (0..4).any(|k| (high[k] - low[k]).abs() > CONSTANT * scale[k]);
         Ok((changes && lift.abs() > 1e-3).then_some(WithLift { without, by_lift }))

@@ -8,11 +8,11 @@ use greylag_num::least_squares;
 
 /// Throttle values at which the settled engines are measured.
 const THROTTLES: [f64; 3] = [0.2, 0.6, 1.0];
-/// Fraction of a surface's moment that full throttle must add to count as slipstream.
+/// Smallest relative change of a surface's effectiveness at full throttle that counts as slipstream.
 const NO_SLIPSTREAM: f64 = 0.01;
 /// Angular momentum that counts as zero, as a fraction of mass · span² per second.
 const NO_MOMENTUM: f64 = 1e-4;
-/// Distance of the thrust from the hub that counts as zero, chords per radian.
+/// Distance of the thrust from the hub that counts as zero, in chords per radian of the angle of attack.
 const NO_OFFSET: f64 = 1e-2;
 
 /// Propeller effects of the aircraft; `None` for an effect that counts as zero.
@@ -26,7 +26,7 @@ pub(super) struct Propeller {
     pub(super) gyro: Option<[f64; 2]>,
     /// Lateral offset of the thrust to the left of the centre of gravity, m.
     pub(super) sideways: Option<f64>,
-    /// Slope of the thrust's distance from the hub over incidence, chords per rad.
+    /// Slope of the thrust's distance from the hub over the angle of attack, chords per rad.
     pub(super) p_factor: Option<f64>,
 }
 
@@ -82,9 +82,9 @@ impl Subject<'_> {
         Ok((thrust, [moment("moments/m-prop-lbsft"), moment("moments/n-prop-lbsft")]))
     }
 
-    /// Slope of the moment coefficient `of` over a surface: without thrust, and its slope over thrust divided by
-    /// dynamic pressure and area. `set` commands the surface to ±`COMMAND`, at which its deflection is ±`unit` (rad).
-    /// `None` if there is no slipstream.
+    /// Effectiveness of a surface: the derivative of the coefficient with index `of` with respect to its deflection, 1/rad.
+    /// Returns the effectiveness without thrust, and its slope over thrust divided by dynamic pressure and area. `set`
+    /// commands the surface to ±`COMMAND`, at which its deflection is ±`unit` (rad). `None` if there is no slipstream.
     fn slipstream(
         &mut self,
         base: &Start,

@@ -17,14 +17,14 @@ const THRUST_STEP: [f64; 2] = [0.4, 0.7];
 const LAG_REPORTED_FROM: f64 = 0.1;
 /// Observation time of the step response, s.
 const STEP_S: f64 = 20.0;
-/// Mean, amplitude and frequency (rad/s) of the throttle sine that validates the lag, and its duration, s.
+/// Mean, amplitude and frequency (rad/s) of the throttle sine on which the lag is validated. `WAVE_S` is its duration, s.
 const WAVE: [f64; 3] = [0.5, 0.1, 3.0];
 const WAVE_S: f64 = 10.0;
 /// Propeller torque that counts as zero, as a fraction of weight times span.
 const NO_MOMENT: f64 = 1e-5;
 /// Offset of the thrust from the centre of gravity that counts as zero, chords.
 pub(super) const NO_ARM: f64 = 1e-3;
-/// Airspeeds of the thrust table as fractions of cruise, and its throttle values.
+/// Airspeeds of the thrust table as fractions of the cruise airspeed. `THROTTLES` has its throttle values.
 const SPEEDS: [f64; 14] = [0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.7];
 const THROTTLES: [f64; 11] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
 /// Newton metres in a pound foot.
@@ -34,9 +34,9 @@ pub(super) const LBF_FT: f64 = 1.355_817_948_331_4;
 pub(super) struct Propulsion {
     /// Coefficients of the settled thrust as a polynomial of throttle and airspeed.
     pub(super) thrust: Vec<Estimate>,
-    /// Settled thrust (N, at sea-level density); `None` if it is no function of throttle and airspeed alone.
+    /// Settled thrust over throttle and airspeed (N, at sea-level density); `None` if it depends on more than these two.
     pub(super) table: Option<Grid>,
-    /// Time constant from throttle position to thrust, s; `None` without a first-order lag.
+    /// Time constant from throttle position to thrust, s; `None` if the thrust has no first-order lag.
     pub(super) lag: Option<f64>,
     /// Rolling moment at full throttle, positive to the left, N m; `None` if negligible.
     pub(super) torque: Option<f64>,
@@ -51,7 +51,7 @@ impl Subject<'_> {
         left_out: &mut Vec<String>,
     ) -> Result<Propulsion, PlantError> {
         let (mut rows, mut thrusts) = (Vec::new(), Vec::new());
-        // Σ l δ, Σ δ², Σ m T, Σ T²
+        // Σ l δ, Σ δ², Σ m T, Σ T² with rolling moment l, throttle δ, pitching moment m and thrust T
         let mut moments = [0.0; 4];
         for speed in [0.8, 1.0, 1.25] {
             for throttle in [0.0, 0.25, 0.5, 0.75, 1.0] {

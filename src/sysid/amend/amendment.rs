@@ -1,4 +1,6 @@
-//! The amendment of a model: tunes its coefficients, then adds effects that improve the prediction of held-out flights.
+//! Amends a model: tunes its coefficients, then adds effects that improve the prediction of held-out flights.
+//!
+//! An effect is a group of model terms with its coefficients, from the catalogue or from an effect file.
 
 mod selection;
 
@@ -32,13 +34,14 @@ pub struct Added {
 }
 
 impl Added {
-    /// A candidate of a diagnosis, with the estimates of the diagnosis as starting values.
+    /// The effect of a `candidate` that a diagnosis found. The starting values are the estimates of the diagnosis.
     pub fn of(candidate: &Candidate) -> Added {
         let of = |name: &str| candidate.parameters.iter().find(|p| p.name == name);
         Added::near(&candidate.id, |name| of(name).map(|p| p.value))
     }
 
-    /// The effect `id`. Its starting values are `value` of each coefficient's name, if this is known for all coefficients.
+    /// The effect `id`. The function `value` returns the starting value of a coefficient from its name. The effect has no
+    /// starting values if `value` returns `None` for any coefficient.
     pub fn near(id: &str, value: impl Fn(&str) -> Option<f64>) -> Added {
         let coefficients = catalogue::describe(id).map(|about| about.coefficients);
         let start = coefficients.and_then(|all| all.iter().map(|c| value(c.name)).collect());
@@ -76,16 +79,16 @@ pub struct Options {
     pub refused: Refused,
     /// Horizons of the free runs, s.
     pub horizons_s: Vec<f64>,
-    /// Whether alternatives to the model's conventions are tried.
+    /// Whether alternatives to the model's integrator, force axes and air density are tried.
     pub conventions: bool,
-    /// Constants estimated for each flight in addition to its sensor errors.
+    /// Trims and misalignment angles that are estimated for each flight, in addition to its sensor errors.
     pub per_flight: PerFlight,
     /// Fit of the model without added effects to the same flights ([`tune`](super::tune)); `None` to compute it.
     pub tuned: Option<Fit>,
 }
 
 impl Options {
-    /// Horizon of the free runs at which fits are compared, s.
+    /// Longest horizon of the free runs at which fits are compared, s.
     pub const JUDGED_AT_S: f64 = JUDGED_AT_S;
 }
 
@@ -104,7 +107,7 @@ impl Default for Options {
     }
 }
 
-/// Result of an amendment, and the models that it compares.
+/// Result of an amendment, with the tuned and the amended model.
 #[derive(Clone, Debug)]
 pub struct Amended {
     /// The amendment's result, as written to `amend.json`.
@@ -116,13 +119,15 @@ pub struct Amended {
 }
 
 impl Amended {
-    /// Coefficients set to zero because an added effect replaces their term, each with the identifier of this effect.
+    /// Names of the coefficients that are zero because an added effect replaces their term. Each name is paired with the
+    /// identifier of this effect.
     pub fn dropped(&self) -> Vec<(String, &'static str)> {
         dropped(&self.tuned, &self.model)
     }
 }
 
-/// Coefficients of `before` whose term an effect of `after` replaces.
+/// Names of the coefficients of `before` whose term is replaced by an effect of `after` and by no effect of `before`. Each
+/// name is paired with the identifier of this effect.
 fn dropped(before: &GreyBox, after: &GreyBox) -> Vec<(String, &'static str)> {
     let still = |name: &str| before.replaced(name).is_none();
     let named = before.coefficients().iter().filter(|c| still(&c.name));
@@ -155,7 +160,8 @@ pub fn amend(
     Ok(amended)
 }
 
-/// Amendment with flights that are already corrected with the constants in the model's file. The answer is empty.
+/// Amends `model` with `flights` that are already corrected with the constants in the model's file. The `answer` of the
+/// result is empty.
 fn of_right(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -217,16 +223,17 @@ fn of_right(
     Ok(Amended { amendment, model: fit.model, tuned: tuned.model })
 }
 
-/// Horizon at which the fit is compared with the model as given, s, from the scores `given` of the latter.
+/// Horizon at which the fit is compared with the model as given, s. `given` are the held-out scores of the model as given.
 fn compared_at(prior: Prior, given: &[HorizonScore]) -> Option<f64> {
     match prior {
         Prior::File => judge::repeated_at(given),
-        // a model whose coefficients are guesses is not kept because few runs are long enough
+        // without a prior, the given coefficients are guesses: a single run at the horizon is enough to replace them
         Prior::Bounds => judge::judged_at(given),
     }
 }
 
-/// Flights of the fit, corrected with the constants in the model's file.
+/// Flights for the fit, corrected with the constants in the model's file. `asked` are the constants to estimate for each
+/// flight.
 struct Right {
     flights: Vec<Reconstruction>,
     asked: PerFlight,
@@ -258,9 +265,10 @@ fn right(model: &GreyBox, flights: &[Reconstruction], mut asked: PerFlight) -> R
     Right { flights, asked, notes }
 }
 
-/// The `fit` with its scores `after`, and a note on the estimated installation: the common misalignment of the axes.
+/// Decides whether the fitted model keeps its installation, the misalignment of the axes that is common to all flights.
+/// Returns the fit, its held-out scores and a note on the decision.
 ///
-/// The installation is kept only if it does not increase the error of the held-out flights.
+/// The installation is kept if it does not increase the held-out error. It is removed if the error increases or is unknown.
 fn installed(
     mut fit: Fit,
     after: Vec<HorizonScore>,
@@ -280,8 +288,8 @@ fn installed(
     (fit, bare, Some(note))
 }
 
-/// Note on the estimated installation, with its angles `words`, from the scaled `errors` of the held-out flights with it and
-/// without it. `errors` is `None` if no free run over held-out flights has an error.
+/// Note on the estimated installation. `words` states its angles. `errors` are the scaled held-out errors with and without
+/// the installation; `None` if they are unknown.
 fn installation_note(words: &str, errors: Option<(f64, f64)>) -> String {
     let found =
         format!("The measured axes of the fitted flights have a common misalignment ({words})");
@@ -308,13 +316,14 @@ pub(super) fn joined(model: &mut GreyBox, added: &Added) -> Result<(), AmendErro
 fn usual_start(about: &Description) -> Vec<f64> {
     let starts = about.entry.map_or(&[][..], |e| e.starts);
     let nearest = |c: &Coefficient| 0.0_f64.clamp(c.bounds.0, c.bounds.1);
-    // an effect file lists its default first, the catalogue lists the typical size in the middle
+    // an effect file lists its default values first; the catalogue lists typical values in the middle
     let own = Kind::from_id(about.id).is_some_and(|kind| kind.written().is_some());
     let listed = starts.get(if own { 0 } else { starts.len() / 2 }).map(|s| s.to_vec());
     listed.unwrap_or_else(|| about.coefficients.iter().map(nearest).collect())
 }
 
-/// Notes on an amendment of `model`: on the fit, on coefficients that are not fitted, on contradictions between flights.
+/// Notes on an amendment of `model`: on the fit, on coefficients that are not fitted, on contradictions between flights,
+/// and on estimates that contradict their bounds or priors.
 fn notes(model: &GreyBox, tuned: &GreyBox, fit: &Fit) -> Vec<String> {
     let mut notes = fit.notes.clone();
     notes.extend(
@@ -338,7 +347,7 @@ fn notes(model: &GreyBox, tuned: &GreyBox, fit: &Fit) -> Vec<String> {
     notes
 }
 
-/// Splits a flight into its first two thirds, for the fit, and its last third, held out.
+/// Splits a flight into two parts: the first two thirds for the fit, and the last third to be held out.
 pub fn split(flight: &Reconstruction) -> [Reconstruction; 2] {
     let total: usize = flight.segments.iter().map(|s| s.instants.len()).sum();
     let mut left = total * 2 / 3;

@@ -1,4 +1,4 @@
-//! The short answer on an amendment, on a diagnosis, and on a comparison of models before and after an amendment.
+//! Short answers (summaries) of an amendment, of a diagnosis, and of a comparison of models before and after an amendment.
 
 use std::path::{Path, PathBuf};
 
@@ -16,8 +16,8 @@ use crate::flight_path::reconstruction::{Instant, Reconstruction};
 use greylag_model::GreyBox;
 use greylag_physics::catalogue;
 
-/// The answer of an amendment, from the errors of the model as given, tuned, and with the added effects. `seen` is the
-/// relation of the held-out flights to the fitted flights.
+/// The answer of an amendment, from the held-out errors of three models: as given, tuned, and with the added effects.
+/// `seen` states whether the held-out flights were also fitted.
 pub fn answer(story: &Amendment, seen: Seen) -> Answer {
     let joined: Vec<_> = story.effects.iter().filter(|e| e.joined).collect();
     let effects = joined.iter().filter_map(|e| {
@@ -39,8 +39,8 @@ pub fn answer(story: &Amendment, seen: Seen) -> Answer {
     })
 }
 
-/// Relation of the flights `held_out` to the flights `fitted`, before corrections. Names do not suffice: logs in two
-/// folders can have the same name, and both parts of a divided flight have the name of the flight.
+/// Whether the flights `held_out` are among the flights `fitted`. Both are reconstructions before corrections. Names do not
+/// suffice: logs in two folders can have the same name, and both parts of a split flight have the name of the flight.
 pub fn seen(fitted: &[Reconstruction], held_out: &[Reconstruction]) -> Seen {
     let (mut same, mut after) = (0, false);
     for held in held_out {
@@ -70,16 +70,17 @@ fn precedes(one: &Reconstruction, other: &Reconstruction) -> bool {
     last.zip(first(other)).is_some_and(|(a, b)| a.time_s < b.time_s)
 }
 
-/// The answer of a diagnosis and its tuned model, estimated by equation error from its flights.
+/// The answer of a diagnosis, and the model tuned to the flights of the diagnosis by equation error.
 #[derive(Clone, Debug)]
 pub struct Diagnosed {
     /// The model with tuned coefficients and without added effects.
     pub tuned: GreyBox,
-    /// Reduction of the free-run error on the flights of the diagnosis, by tuning and by each effect.
+    /// Reduction of the free-run error on the flights of the diagnosis, by tuning and by all asserted effects together.
     pub answer: Answer,
 }
 
-/// Evaluates tuning and the asserted effects of `diagnosis` on its own `flights`.
+/// Computes how much tuning and the asserted effects of `diagnosis` reduce the free-run error of `model` on `flights`, the
+/// flights of the diagnosis.
 ///
 /// # Errors
 /// An effect cannot be added to the model, or a flight cannot be resampled.
@@ -126,7 +127,7 @@ pub fn diagnosed(
     Ok(Diagnosed { tuned, answer })
 }
 
-/// Estimate of a coefficient, from a fit or from its `amend.json`.
+/// Estimate of a coefficient, from a fit or read from `amend.json`.
 #[derive(Clone, Debug, Deserialize)]
 struct Known {
     name: String,
@@ -143,7 +144,7 @@ impl Known {
     }
 }
 
-/// The effect's most significant coefficient among `known`.
+/// The most significant coefficient of the effect `id` among `known`.
 fn decisive(id: &str, description: &str, known: impl Iterator<Item = Known>) -> Option<Decisive> {
     let of = |p: Known| {
         let (effect, coefficient) = p.name.split_once('.')?;
@@ -201,16 +202,16 @@ impl Origin {
         (origin.model == before.name).then_some(origin)
     }
 
-    /// `before` with the coefficients that the amendment tuned, without added effects. `None` if `before` lacks one of
-    /// them.
+    /// The model `before` with the coefficients as tuned in the amendment, without added effects. `None` if `before` lacks
+    /// one of these coefficients.
     pub fn tuned(&self, before: &GreyBox) -> Option<GreyBox> {
         let mut tuned = before.clone();
         let set = |p: &Known| tuned.set_coefficient(&p.name, p.value);
         self.tuned.iter().all(set).then_some(tuned)
     }
 
-    /// The answer of a comparison between the model before and the one after; `tuned` holds the free-run errors of
-    /// the tuned model.
+    /// The answer of the comparison `c` between the model before the amendment and the amended model. `tuned` holds the
+    /// free-run errors of the tuned model without effects, `logs` the paths of the compared flights.
     pub fn answer(&self, c: &Comparison, tuned: &[HorizonScore], logs: &[PathBuf]) -> Answer {
         let stage =
             |k: usize, way| Stage { way, model: &c.models[k].name, scores: &c.models[k].free_run };

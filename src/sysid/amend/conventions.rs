@@ -1,4 +1,4 @@
-//! Modelling conventions: integrator, force axes and air density. No coefficient can compensate a wrong convention.
+//! Modelling conventions: integrator, force axes and air density. No coefficient can compensate for a wrong convention.
 
 use serde::Serialize;
 
@@ -13,11 +13,13 @@ const CLEARLY: f64 = 1.96;
 /// Relative change of the held-out error that counts as large.
 const MUCH: f64 = 0.1;
 
-/// Number of standard errors by which `other` follows the shots more closely than `fit`.
+/// Number of standard errors by which `other` fits the shots better than `fit`. Shots are the short free runs of the
+/// output-error fit.
 ///
 /// The number is the mean decrease of the shots' costs divided by its standard error (Vuong 1989). The total decrease is
-/// first reduced by 2 for each additional coefficient (Akaike). The weights of a fit favour this fit. The cost of a shot is
-/// therefore the mean of its costs with the weights of both fits. Zero if the fits have fewer than three shots in common.
+/// first reduced by 2 for each additional coefficient (Akaike). The weights estimated by a fit favour this fit. The cost of
+/// a shot is therefore the mean of two costs, with the weights of either fit. The result is zero if the fits have fewer
+/// than three shots in common.
 pub(super) fn closer(fit: &Fit, other: &Fit) -> f64 {
     let cost = |left: &Left| -> f64 {
         let weigh = |squares: &[f64; 8], weights: &[f64; 8]| -> f64 {
@@ -86,8 +88,8 @@ impl Convention {
         }
     }
 
-    /// Whether the alternative is adopted. The alternative follows the shots more closely by `closer` standard errors; `error`
-    /// holds the held-out errors without and with the alternative.
+    /// Whether the alternative is adopted. `closer` is the number of standard errors by which the alternative fits the
+    /// shots better. `error` holds the held-out errors without and with the alternative.
     ///
     /// Integrator and axes are choices of a simulator or an author: their alternatives need positive evidence. Air density
     /// decreases with height: the standard atmosphere is adopted unless the data contradict it.
@@ -124,7 +126,7 @@ impl Convention {
     }
 }
 
-/// A convention that was tried, with its evidence.
+/// An alternative convention that was tried, with the evidence for or against it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Tried {
     /// The convention that was changed.
@@ -136,7 +138,7 @@ pub struct Tried {
     /// Held-out free-run errors without and with the alternative, at the longest horizon up to 5 s that a run reaches, after a
     /// refit of all coefficients. NaN if there is no such horizon or the fit fails.
     pub error: [f64; 2],
-    /// Number of standard errors by which the alternative follows the fitted flights more closely; NaN if the fit fails.
+    /// Number of standard errors by which the alternative fits the fitted flights better; NaN if the fit fails.
     pub closer: f64,
     /// Whether the amended model adopts the alternative.
     pub kept: bool,

@@ -1,4 +1,4 @@
-//! An amendment as files: the model file's new text, and the result as JSON.
+//! Files of an amendment: the new text of the model file, and the result as JSON.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use greylag_model::edit::{Edit, EditError, Number};
 use greylag_physics::catalogue;
 use greylag_physics::formula::Written;
 
-/// Hexadecimal digits of a log's SHA-256 that a coefficient's source quotes.
+/// Number of hexadecimal digits of a log's SHA-256 in the `source` entry of a fitted coefficient.
 const PREFIX: usize = 12;
 /// Longest name of a model, bytes.
 const NAME: usize = 64;
@@ -125,8 +125,8 @@ impl Original {
     }
 }
 
-/// Name and text of each file of an amended model: airframe, effects, model, result. The logs are those of the fit,
-/// then those held out.
+/// Name and text of each file of an amended model: airframe, effects, model, result. `logs` were fitted, `hold_out` are the
+/// held-out logs.
 ///
 /// # Errors
 /// The original is no model file or has a learned residual, the result holds a number that JSON cannot represent, or two
@@ -168,7 +168,7 @@ fn distinct(files: &[(String, String)]) -> Result<(), DocumentError> {
     }
 }
 
-/// The changes to the model file.
+/// The changes that turn the original model file into the file of the amended model.
 fn edit(before: &GreyBox, amended: &Amended, logs: &[Hashed], airframe: String) -> Edit {
     let fitted = &amended.amendment.parameters;
     let known = before.coefficients().len();
@@ -214,7 +214,7 @@ fn short(log: &Hashed) -> String {
 }
 
 /// The first difference between `read` and `meant`, in words: a convention, the number of coefficients, constants of the
-/// installation or the flights, or a coefficient that differs in any bit. `None` if there is none.
+/// installation or the flights, or a coefficient that differs in any bit. `None` if the models are equal.
 pub fn differs(read: &GreyBox, meant: &GreyBox) -> Option<String> {
     if let Some(other) = Convention::ALL.into_iter().find(|c| c.of(read) != c.of(meant)) {
         return Some(other.key().join("."));

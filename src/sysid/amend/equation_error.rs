@@ -1,4 +1,4 @@
-//! Equation-error fit in weak form: it converges from poor values and provides starting values for the output-error fit.
+//! Equation-error fit in weak form. It converges from poor values and provides starting values for the output-error fit.
 
 use std::cmp::Ordering;
 
@@ -14,17 +14,18 @@ use greylag_model::GreyBox;
 const CHANNELS: usize = 6;
 /// Largest number of iterations of one search.
 const ITERATIONS: usize = 5;
-/// Number of iterations from each starting point before the starting points are compared.
+/// Number of iterations from each starting point, after which the best starting point is selected.
 const TRIAL: usize = 2;
-/// Largest number of starting points. Two effects of files with three shape constants each can have thousands.
+/// Largest number of starting points. Two effect files with three shape constants each can give thousands of combinations.
 const MOST_STARTS: usize = 256;
-/// Convergence tolerance: decrease of the weighted sum of squares for a change by a tenth of a standard deviation.
+/// The search ends if the predicted decrease of the weighted sum of squares is at most this. A change by a tenth of a
+/// standard deviation gives this decrease.
 const COST_TOLERANCE: f64 = 0.01;
 /// Number of independent samples for which a window counts: windows overlap by half.
 const INDEPENDENT_FRACTION: f64 = 0.5;
 
-/// Estimates the free coefficients from forces and moments in weak form. The result is the best one over the catalogue's
-/// starting values for shape constants of added effects.
+/// Estimates the free coefficients from forces and moments in weak form. The search continues from the best of several
+/// starting points.
 pub(super) fn start(model: &GreyBox, free: &[Free], flights: &[Flight]) -> Vec<f64> {
     let starts = starts(free);
     let trials = if starts.len() > 1 { TRIAL } else { 0 };
@@ -36,7 +37,8 @@ pub(super) fn start(model: &GreyBox, free: &[Free], flights: &[Flight]) -> Vec<f
 }
 
 /// Starting points: the prior means, with every combination of the catalogue's starting values for the shape constants of
-/// added effects. A constant that would lead to more than [`MOST_STARTS`] combinations keeps its prior mean.
+/// added effects. Shape constants are coefficients in which the model is nonlinear. A constant that would lead to more than
+/// [`MOST_STARTS`] combinations keeps its prior mean.
 fn starts(free: &[Free]) -> Vec<Vec<f64>> {
     let mut starts: Vec<Vec<f64>> = vec![free.iter().map(|f| f.prior).collect()];
     for (k, f) in free.iter().enumerate().filter(|(_, f)| f.added && !f.linear) {
@@ -52,8 +54,8 @@ fn starts(free: &[Free]) -> Vec<Vec<f64>> {
     starts
 }
 
-/// Each of `starts` with each of `values` in `place`; `starts` as they are if there are fewer than two values, or if the
-/// combinations would be more than [`MOST_STARTS`].
+/// All combinations of `starts` with `values` at the index `place`. Returns `starts` unchanged if there are fewer than two
+/// values, or if there would be more than [`MOST_STARTS`] combinations.
 fn combined(starts: Vec<Vec<f64>>, place: usize, values: &[f64]) -> Vec<Vec<f64>> {
     if values.len() < 2 || starts.len() * values.len() > MOST_STARTS {
         return starts;
@@ -89,7 +91,7 @@ fn residuals(model: &GreyBox, flights: &[Flight]) -> Residuals {
     all
 }
 
-/// Gauss–Newton search from `theta`: smallest cost and the coefficients at this cost.
+/// Gauss–Newton search from `theta`. Returns the smallest misfit and the coefficients that give it.
 fn search(
     model: &GreyBox,
     free: &[Free],
@@ -126,18 +128,19 @@ fn weights(r: &Residuals) -> [f64; CHANNELS] {
     std::array::from_fn(|k| 1.0 / mean_square(r, k))
 }
 
-/// Mean square of a channel's residuals; 1 if none is finite, so that the channel has no effect on a sum of logarithms.
+/// Mean square of a channel's residuals. It is 1 if no residual is finite: the channel then adds zero to a sum of
+/// logarithms.
 fn mean_square(r: &Residuals, channel: usize) -> f64 {
     let own = r.values.iter().zip(&r.channel).filter(|(x, c)| **c == channel && x.is_finite());
     let (sum, n) = own.fold((0.0, 0.0), |(s, n), (x, _)| (s + x * x, n + 1.0));
     if n > 0.0 { sum / n } else { 1.0 }
 }
 
-/// How far the coefficients are from the flights.
+/// Misfit between the flights and the predictions of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Misfit {
-    /// Number of channels without a finite residual. Every point has those that are not measured; a point with more has
-    /// predictions that are no numbers, whatever its cost over the other channels.
+    /// Number of channels without a finite residual. Unmeasured channels count for every set of coefficients. A larger
+    /// number means that predictions are NaN: such a misfit is worse, whatever its `cost`.
     missing: usize,
     /// Concentrated negative log-likelihood: Σ ln of the channels' mean squares.
     cost: f64,

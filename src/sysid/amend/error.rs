@@ -32,12 +32,13 @@ pub enum AmendError {
          or cut one into parts with `greylag logs convert`"
     )]
     TooFewFlights {
-        /// Number of flights that are long enough to be predicted, or of all flights if even these are too few.
+        /// Number of flights that are long enough to be predicted. If there are too few flights of any length, the number
+        /// of all flights.
         flights: usize,
         /// Smallest number of flights for the cross-validation.
         needed: usize,
     },
-    /// Two flights of one name cannot have constants of their own, which the model's file keeps by the flights' names.
+    /// Two flights have the same name. The model's file identifies the constants of a flight by the flight's name.
     #[error(
         "cannot estimate trims or axes for each flight: two of them are called {name}, and the model's file keeps these constants by \
          name; rename one of the logs"

@@ -10,22 +10,23 @@ use crate::weak_form::prepared::{ClockError, Prepared};
 pub(super) const SENSORS: usize = 8;
 /// Index of the actuators' delay (s) among the sensor constants.
 pub(super) const SKEW: usize = 0;
-/// Index of the state to which each constant after the delay is added. The constant of the airspeed is relative.
+/// Index of the state to which each sensor constant between delay and blur is added. The constant of the airspeed is a
+/// relative error.
 pub(super) const OFFSETS: [usize; SENSORS - 2] = [2, 3, 4, 5, 6, 7];
-/// Index of the actuators' blur, the last sensor constant. The blur is half the variance, in squared sampling intervals, of
-/// the averaging interval of a recorded deflection.
+/// Index of the actuators' blur, the last sensor constant. A recorded deflection may be a weighted mean over time. The blur
+/// is half the variance of these weights in time, in squared sampling intervals.
 pub(super) const BLUR: usize = SENSORS - 1;
 /// Index of the airspeed among the eight states.
 pub(super) const AIRSPEED: usize = 2;
 
-/// Smallest standard deviation of the actuators' delay estimated from forces, s. The root mean square error of this delay
-/// against simulated truth is 0.3 ms.
+/// Smallest standard deviation assumed for an actuators' delay that is estimated from forces, s. In simulations, the root
+/// mean square error of this delay is 0.3 ms.
 pub(super) const SKEW_LEAST: f64 = 5e-4;
 /// Prior standard deviation of the actuators' delay relative to the gyros, s. The 95 % interval is ±1.5 samples: actuators
 /// and gyros are each recorded 0 to 10 ms late.
 const SKEW_SD: f64 = 7.7e-3;
-/// Prior standard deviations if the reconstruction states none: airspeed scale (relative), body rates (rad/s), α and β
-/// (rad).
+/// Prior standard deviations of sensor errors for which the reconstruction states none: airspeed scale (relative), biases
+/// of the body rates (rad/s), α and β (rad).
 const DOUBT: [f64; 6] = [0.003, 2e-4, 2e-4, 2e-4, 0.002, 0.002];
 /// Names of these constants in the reconstruction, in the order of `DOUBT`.
 const NAMES: [&str; 6] =

@@ -20,8 +20,8 @@ impl Covariance {
 
 /// The covariance at the optimum; `None` if `information` is not positive definite.
 ///
-/// `information` includes the prior, and `prior` is the diagonal of the prior's information. `scores` are the gradients of
-/// the data's cost over blocks of data that are treated as independent.
+/// `information` includes the prior. `prior` is the diagonal of the prior's information. Each of `scores` is the gradient
+/// of the cost over one block of data; blocks are treated as independent.
 ///
 /// The inverse information is the covariance if the weights are correct. The sandwich estimator does not need this
 /// assumption, but it is biased low and uncertain for few blocks. The variance of each unknown is the larger of the two

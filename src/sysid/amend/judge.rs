@@ -10,26 +10,28 @@ use super::result::{AddedEffect, Parameter};
 use crate::compare::{HorizonScore, free_run};
 use greylag_model::GreyBox;
 
-/// Horizon of the free runs at which fits are compared, s.
+/// Longest horizon of the free runs at which fits are compared, s.
 pub const JUDGED_AT_S: f64 = 5.0;
 /// Smallest relative decrease of the held-out error for which an effect is accepted.
 pub(super) const IMPROVED: f64 = 0.01;
-/// An effect that reduces the held-out error below this share of the previous error is accepted although the search has not
-/// converged with it. Convergence may need further effects.
+/// An effect that reduces the held-out error below this fraction of the previous error is accepted although the search has
+/// not converged with it. Convergence may need further effects.
 pub const ACCEPTED_UNCONVERGED: f64 = 0.5;
-/// Standard deviations in half of a 95 % interval. At least one coefficient of an effect must differ from zero by as many.
+/// Half width of a 95 % interval in standard deviations. At least one coefficient of an effect must differ from zero by
+/// this number of standard deviations.
 pub(super) const CLEAR: f64 = 1.96;
-/// The same number for effects of more than three coefficients: with many coefficients, one exceeds `CLEAR` by chance.
+/// Replaces `CLEAR` for effects with more than three coefficients. Among many coefficients, one can exceed `CLEAR` by
+/// chance.
 const CLEAR_OF_MANY: f64 = 3.0;
-/// Smallest scaled error of a free run of which a logarithm is taken.
+/// Smaller scaled errors of free runs are raised to this value before the logarithm is taken.
 const LEAST_ERROR: f64 = 1e-12;
-/// Flights disagree if the estimate of one flight differs from the common estimate by more than this number of standard
+/// A flight contradicts the common estimate if its own estimate differs from it by more than this number of standard
 /// deviations, and by more than [`DISAGREE_SHARE`].
 const DISAGREE: f64 = 4.0;
-/// Objection to an effect that no free run over held-out flights can judge.
+/// Objection to an effect that cannot be validated, because no free run over held-out flights is long enough.
 const UNJUDGED: &str =
     "no flight that the fit did not see is long enough for a free run; hold out a longer one";
-/// Relative difference of estimates above which flights can disagree.
+/// A flight contradicts the common estimate only if the relative difference of its own estimate exceeds this.
 const DISAGREE_SHARE: f64 = 0.3;
 
 impl AddedEffect {
@@ -58,16 +60,18 @@ pub struct Judge<'a> {
 pub type Kept = (Fit, Vec<HorizonScore>);
 
 impl Judge<'_> {
-    /// Free-run errors of `model` over the held-out flights, one entry for each horizon.
+    /// Free-run errors of `model` over the held-out flights, with one entry for each horizon.
     pub fn scores(&self, model: &GreyBox) -> Vec<HorizonScore> {
         let flights: Vec<_> = self.test.iter().map(|f| f.prepared.clone()).collect();
         let (runs, _) = free_run::fly(model, &flights, self.horizons_s);
         self.horizons_s.iter().map(|h| runs.score(*h)).collect()
     }
 
-    /// Mean of ln(scaled error of `before` / scaled error of `after`), paired over the free runs of `horizon_s` (s) over the held-out
-    /// flights, and its standard error. A logarithm, so that one run that diverges does not outweigh all others. Runs that are
-    /// longer than the time between their starts overlap, and count accordingly less.
+    /// Mean of ln(scaled error of `before` / scaled error of `after`) over all held-out free runs of `horizon_s` (s), and
+    /// its standard error.
+    ///
+    /// Because of the logarithm, a single diverged run does not outweigh all others. Runs overlap if they are longer than
+    /// the time between their starts. The standard error is increased accordingly.
     ///
     /// `None` if fewer than two runs reach the horizon.
     pub fn decrease(&self, horizon_s: f64, before: &GreyBox, after: &GreyBox) -> Option<[f64; 2]> {
@@ -81,8 +85,8 @@ impl Judge<'_> {
         (less.len() > 1).then(|| mean_with_error(&less)).map(|[mean, e]| [mean, e * overlap.sqrt()])
     }
 
-    /// Decides on the effect `added` from its fit and the held-out scores `before`. Returns the effect's record, and the fit with
-    /// its scores if the effect is accepted.
+    /// Decides on the effect `added` from its fit `fitted` and the held-out scores `before` of the model without it.
+    /// Returns the effect's record, and the fit with its scores if the effect is accepted.
     pub fn verdict(
         &self,
         added: &Added,
@@ -123,7 +127,7 @@ impl Judge<'_> {
     }
 }
 
-/// The result of a fit; `None` if it did not converge or its equations have no solution. Other errors are returned.
+/// The result of a fit; `None` if the fit did not converge or its equations have no solution. Other errors are returned.
 pub fn settled<T>(of: Result<T, AmendError>) -> Result<Option<T>, AmendError> {
     match of {
         Ok(of) => Ok(Some(of)),
@@ -270,7 +274,7 @@ pub fn against_prior(parameters: &[Parameter]) -> Vec<String> {
         .collect()
 }
 
-/// The first flight whose estimate contradicts the estimate from all flights, with its estimate.
+/// The first flight whose own estimate contradicts the estimate from all flights, and this own estimate.
 fn outlier(p: &Parameter) -> Option<(&str, f64)> {
     let far = |value: f64, sd: f64| {
         let off = (value - p.value).abs();

@@ -1,11 +1,11 @@
-//! Constants of the flights and of the common installation that a fit has estimated, as written to the model's file.
+//! Fitted constants of the flights and of the common installation, as written to the model's file.
 
 use super::flight::{OFFSETS, Own, SENSORS, SKEW};
 use crate::amend::error::AmendError;
 use crate::per_flight::PerFlight;
 use greylag_model::{FlightConstants, Known};
 
-/// A mean over flights becomes a constant of the installation if it exceeds this number of standard errors.
+/// The mean of an angle over flights becomes a constant of the installation if it exceeds this number of standard errors.
 const CLEAR: f64 = 2.0;
 /// Source of the constants, as written to the model's file.
 const BY: &str = "greylag amend";
@@ -31,7 +31,8 @@ impl Learned<'_> {
     }
 }
 
-/// Checks that the flights, called `names`, can have the constants `asked`, which the model's file keeps by name.
+/// Checks that the flights `names` can have the constants `asked`. The model's file identifies the constants of a flight by
+/// the flight's name.
 ///
 /// # Errors
 /// Two flights have the same name.
@@ -49,7 +50,8 @@ pub(super) fn distinct(names: &[&str], asked: &PerFlight) -> Result<(), AmendErr
 /// Constants for the model's file after a fit to `flights` with the per-flight constants `asked`. `before` holds the previous
 /// constants of the file.
 ///
-/// Each flight has its constants. The installation has the mean misalignment angles that differ significantly from zero.
+/// Every flight gets an entry of its own. The installation gets the mean misalignment angles that differ significantly from
+/// zero.
 pub(super) fn known(before: &Known, flights: &[Learned], asked: &PerFlight) -> Known {
     let anew = asked.angles() > 0;
     if !anew && !asked.has_trims() {
@@ -75,7 +77,7 @@ pub(super) fn known(before: &Known, flights: &[Learned], asked: &PerFlight) -> K
     all
 }
 
-/// The constants without trims. Trims are not valid after a change of coefficients.
+/// The constants `known` without trims. Trims are not valid after a change of coefficients.
 fn without_trims(known: &Known) -> Known {
     let mut kept = known.clone();
     kept.flights.values_mut().for_each(|own| own.trims = None);

@@ -41,7 +41,7 @@ pub enum Fitted {
         /// Constants estimated for each flight.
         per_flight: PerFlight,
     },
-    /// All coefficients of the model, including those with the value zero. Their only prior are the physical bounds.
+    /// All coefficients of the model, including those with the value zero. The physical bounds are their only prior.
     FromScratch,
 }
 
@@ -92,7 +92,7 @@ pub fn leave_one_out(
     };
     let right = ready(&put_right(&model.known, flights).0)?;
     let ready = ready(flights)?;
-    // the errors of all structures are taken at one horizon, the longest one that all predicted flights reach
+    // all structures are compared at one horizon: the longest horizon that every predicted flight reaches
     let reached = |f: &Flight| judged_at(&scores(model, std::slice::from_ref(f), horizons_s));
     let reached: Vec<Option<f64>> = ready.iter().map(reached).collect();
     let at = reached.iter().flatten().copied().fold(f64::INFINITY, f64::min);
@@ -168,7 +168,8 @@ fn scores(
     Judge { test, horizons_s }.scores(model)
 }
 
-/// Error of flight number `left` with the fit to all other flights, or the reason why this fit fails.
+/// Error of the left-out flight with the index `left`, predicted by the fit to all other flights. The inner error is the
+/// reason why this fit failed.
 fn error_of(
     model: &GreyBox,
     set: &Set,

@@ -1,7 +1,7 @@
 //! Refits a model to flights by output error and adds effects to it.
 //!
-//! The method is described in `docs/explanation/diagnosis.md`: an equation-error fit starts the coefficients,
-//! multi-step shooting refines them, and held-out flights judge the result.
+//! The method is described in `docs/explanation/diagnosis.md`. An equation-error fit provides starting values of the
+//! coefficients. An output-error fit by multiple shooting refines them. Held-out flights validate the result.
 
 mod amendment;
 mod answer;

@@ -1,4 +1,5 @@
-//! Derivatives of a shot's residuals, and normal equations with the errors of the initial state eliminated.
+//! Derivatives of the residuals of a shot (a short free run), and normal equations from which the errors of the initial
+//! state are eliminated.
 
 use std::borrow::Cow;
 
@@ -42,7 +43,8 @@ pub(super) struct Weights {
     pub start: [f64; 8],
 }
 
-/// Acting deflections, by flight, segment and sample.
+/// Acting deflections, by flight, segment and model step. They are the recorded deflections after corrections of the record
+/// and after the lags and delays of the model's input effects.
 pub(super) type Acting = Vec<Vec<Vec<Controls>>>;
 
 /// Perturbed models for the derivative with respect to one coefficient.
@@ -56,14 +58,14 @@ struct Variant {
 
 struct Side {
     model: GreyBox,
-    /// Acting deflections; `None` if they are those under the present model.
+    /// Acting deflections under `model`; `None` if they are equal to those under the present model.
     acting: Option<Acting>,
 }
 
 /// The present model with the perturbed models of its derivatives.
 pub(super) struct Neighbourhood {
     pub model: GreyBox,
-    /// Constants estimated for each flight in addition to its sensor errors.
+    /// Trims and misalignment angles that are estimated for each flight, in addition to its sensor errors.
     pub asked: PerFlight,
     /// Acting deflections under the present model.
     pub acting: Acting,
@@ -122,14 +124,15 @@ pub(super) struct Normal {
     pub information: DMatrix<f64>,
     /// Gradient after elimination of the initial state.
     pub gradient: DVector<f64>,
-    /// Inverse information of the initial state. The next two fields are its coupling to the other unknowns and its gradient.
+    /// Inverse information of the initial state. `coupling` is the information that couples the initial state to the other
+    /// unknowns, `start_gradient` is the gradient with respect to the initial state.
     inverse: SMatrix<f64, 8, 8>,
     coupling: DMatrix<f64>,
     start_gradient: SVector<f64, 8>,
 }
 
 impl Normal {
-    /// Optimal change of the initial state for a change `step` of the other unknowns.
+    /// Change of the initial state that minimises the cost for a given change `step` of the other unknowns.
     pub fn start_step(&self, step: &DVector<f64>) -> [f64; 8] {
         let moved = self.coupling.transpose() * step;
         let gradient = SVector::<f64, 8>::from_fn(|i, _| self.start_gradient[i] + moved[i]);
@@ -171,8 +174,8 @@ pub(super) fn run(
     shooting::residuals(flight, shot, own, &model.scale(), &path)
 }
 
-/// Derivatives of the residuals of shot `index`. The columns are the free coefficients, the flight's constants and the
-/// initial state. Each sample has eight rows.
+/// Derivatives of the residuals of `shot`, which has the number `index`. The columns are the free coefficients, the
+/// flight's constants and the initial state. Each sample has eight rows, one for each state.
 pub(super) fn jacobian(
     around: &Neighbourhood,
     flights: &[Flight],
@@ -245,7 +248,7 @@ pub(super) fn normal(
     eliminate(&j, &r, from, w)
 }
 
-/// Derivatives with respect to the sensors' offsets: the direct effect less the effect through the initial state.
+/// Fills the columns of the sensors' offsets: the direct effect on the residual less the effect through the initial state.
 fn sensor_columns(
     j: &mut DMatrix<f64>,
     [count, starts]: [usize; 2],
@@ -266,7 +269,7 @@ fn sensor_columns(
     }
 }
 
-/// Derivatives with respect to the misalignment angles, in the columns from `first` on: the direct effect less the effect
+/// Fills the columns of the misalignment angles, which begin at `first`: the direct effect on the residual less the effect
 /// through the initial state.
 fn askew_columns(
     j: &mut DMatrix<f64>,
@@ -298,7 +301,7 @@ fn eliminate(j: &DMatrix<f64>, r: &DVector<f64>, from: &[f64; 8], w: &Weights) -
         own[(k, k)] += w.start[k];
         start_gradient[k] += w.start[k] * from[k];
     }
-    // positive definite because of the prior; NaN values end the search
+    // the matrix is positive definite because of the prior; if rounding makes it singular, NaN ends the search
     let inverse = own.try_inverse().unwrap_or_else(|| SMatrix::from_element(f64::NAN));
     let coupling = all.view((0, m), (m, 8)).into_owned();
     let through = &coupling * inverse;

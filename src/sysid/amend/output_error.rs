@@ -28,11 +28,12 @@ use greylag_num::statistics::quantile;
 
 /// Smallest usable duration of all flights together, s.
 pub const LEAST_S: f64 = 10.0;
-/// Convergence tolerance of the steps with the same derivatives: largest change of a coefficient in its standard deviations.
+/// Steps with the same derivatives end if no coefficient changes by more than this number of standard deviations.
 const STEP_TOLERANCE: f64 = 0.03;
-/// Derivatives are renewed until a renewal changes no coefficient by more than this number of standard deviations.
+/// Derivatives are recomputed until a step with new derivatives changes no coefficient by more than this number of standard
+/// deviations.
 const RENEWED: f64 = 0.1;
-/// Tolerance in the sense of `RENEWED` for all shot lengths except the last.
+/// Replaces `RENEWED` for all shot lengths except the last.
 const NEAR: f64 = 5.0;
 /// Largest number of steps with the same derivatives.
 const INNER: usize = 6;
@@ -48,9 +49,9 @@ pub struct FitOptions {
     pub added: Vec<String>,
     /// Lengths of the shots, s. The fit uses one length after the other.
     pub lengths_s: Vec<f64>,
-    /// Largest number of renewals of the derivatives for the last length.
+    /// Largest number of times that the derivatives are computed for the last length.
     pub renewals: usize,
-    /// Constants estimated for each flight in addition to its sensor errors.
+    /// Trims and misalignment angles that are estimated for each flight, in addition to its sensor errors.
     pub per_flight: PerFlight,
 }
 
@@ -82,10 +83,10 @@ pub struct Fit {
     pub(super) weights: Weights,
     /// Number of iterations made.
     pub iterations: usize,
-    /// Sentence on the parameter that had not converged when the search ended; `None` if all converged. All intervals are widened
-    /// by the last change of this parameter.
+    /// Sentence on the parameter that had not converged when the search ended; `None` if all parameters converged. The last
+    /// change of this parameter widens all intervals.
     pub unsettled: Option<String>,
-    /// Notes for the reader.
+    /// Notes on the fit for the user, in sentences.
     pub notes: Vec<String>,
 }
 
@@ -103,9 +104,9 @@ pub(super) struct Left {
 /// Fits the free coefficients of `model` to `flights`. `progress` receives the stages and may cancel.
 ///
 /// # Errors
-/// The flights are shorter than `LEAST_S`, two flights of one name are to have constants of their own, no coefficient is
-/// free, the flights excite none, free runs diverge too early, the search does not converge or its equations are singular,
-/// or `progress` cancelled.
+/// The flights are shorter than `LEAST_S` in total, two flights with constants of their own have the same name, no
+/// coefficient is free, the flights excite none, free runs diverge too early, the search does not converge or its equations
+/// are singular, or `progress` cancelled.
 pub fn fit(
     model: &GreyBox,
     flights: &[Flight],
@@ -166,8 +167,8 @@ pub fn fit(
     search.finish(model, &held)
 }
 
-/// The actuators' delays, estimated together with an input effect of the model: free runs cannot distinguish a delay of the
-/// record from a delay of the actuators.
+/// Estimates the delays of the recorded actuators from forces and moments, together with the input effects of the model.
+/// Free runs cannot distinguish a delay of the record from a delay of the actuators.
 fn clocks(
     model: &GreyBox,
     free: &[Free],
@@ -189,12 +190,12 @@ fn values(model: &GreyBox, free: &[Free]) -> Vec<f64> {
 struct Search<'a> {
     /// The model, with trim terms if trims are estimated.
     base: &'a GreyBox,
-    /// Constants estimated for each flight in addition to its sensor errors.
+    /// Trims and misalignment angles that are estimated for each flight, in addition to its sensor errors.
     asked: PerFlight,
     flights: &'a [Flight],
     free: Vec<Free>,
     shots: Vec<Shot>,
-    /// Derivatives of each shot's residuals, possibly at an earlier point of the search.
+    /// Derivatives of each shot's residuals, possibly computed at an earlier point of the search.
     jacobians: Vec<DMatrix<f64>>,
     /// Number of shots cut short because their runs diverge.
     short: usize,
@@ -205,8 +206,8 @@ struct Search<'a> {
     iterations: usize,
     /// Largest change of a coefficient in the last step, in its standard deviations, and the coefficient's index.
     change: (f64, usize),
-    /// Whether the last step was rejected because the cost did not decrease with any damping. The cost jumps, for example, where
-    /// a run begins to stall.
+    /// Whether the last step was rejected because no damping decreased the cost. This can happen because the cost is
+    /// discontinuous, for example where a run begins to stall.
     stuck: bool,
 }
 
@@ -296,9 +297,9 @@ impl<'a> Search<'a> {
 
     /// Iterates estimates and weights to convergence.
     ///
-    /// The derivatives are the most expensive part. They are renewed after the search has converged with the old derivatives,
-    /// until a renewal changes no coefficient by more than `tolerance` standard deviations. `step` receives the share of the
-    /// renewals that is done.
+    /// The derivatives are the most expensive part. They are recomputed only after the search has converged with the old
+    /// derivatives. The search ends if a step with new derivatives changes no coefficient by more than `tolerance` standard
+    /// deviations. `step` receives the fraction of `renewals` that is done.
     fn settle(
         &mut self,
         renewals: usize,

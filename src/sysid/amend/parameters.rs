@@ -12,16 +12,17 @@ const HELD: &[&str] = &["lift_stall.k"];
 /// Effects that are curves without a formula. Their ordinates have a narrow prior about their starting values. This prior
 /// determines the curve in ranges with few data.
 pub(super) const SLIGHT: &[&str] = &["lift_curve", "drag_curve"];
-/// Prior standard deviation of an ordinate of a curve, as a share of the range of its bounds.
+/// Prior standard deviation of an ordinate of a curve, as a fraction of the range of its bounds.
 const SLIGHT_SHARE: f64 = 0.1;
-/// Pairs of a curve and an effect with a formula of the same shape. The shape constants of the formula are held, because the
-/// curve can represent any change of them.
+/// Pairs of a curve and an effect whose formula describes the same curve. The shape constants of the formula are held,
+/// because the curve can represent any change of them.
 const TAKES_OVER: &[(&str, &str)] = &[("lift_curve", "lift_stall")];
-/// Finite-difference step of a coefficient with a prior, as a share of its prior standard deviation.
+/// Finite-difference step of a coefficient in which the model is linear, as a fraction of its prior standard deviation.
 const STEP: f64 = 1e-3;
-/// Finite-difference step of a shape constant or of an input effect's constant, as a share of its value.
+/// Finite-difference step of a shape constant, as a fraction of its value. Shape constants are coefficients in which the
+/// model is nonlinear.
 const SHAPE_STEP: f64 = 0.02;
-/// Largest change of a shape constant in one iteration, as a share of its value.
+/// Largest change of a shape constant in one iteration, as a fraction of its value.
 const SHAPE_STRIDE: f64 = 0.4;
 
 /// A coefficient that the fit estimates.
@@ -33,7 +34,7 @@ pub(super) struct Free {
     pub name: String,
     /// Meaning, with its unit.
     pub meaning: &'static str,
-    /// Prior mean; `width` is the prior standard deviation.
+    /// Prior mean. `width` is the prior standard deviation.
     pub prior: f64,
     pub width: f64,
     /// Physically possible range.
@@ -46,8 +47,8 @@ pub(super) struct Free {
     pub linear: bool,
     /// Whether the coefficient belongs to an input effect, which converts measured to acting deflections.
     pub input: bool,
-    /// Whether the coefficient changes the acting deflections for given measured deflections, or the state of a formula's lags
-    /// and delays.
+    /// Whether the coefficient changes the acting deflections for given measured deflections, or the lags and delays of a
+    /// formula.
     pub acting: bool,
     /// Whether the coefficient belongs to an added effect.
     pub added: bool,
@@ -58,16 +59,16 @@ pub(super) fn describe(id: &str) -> Option<(Description, bool)> {
     catalogue::describe(id).map(|about| (about, inputs::Kind::from_id(id).is_some()))
 }
 
-/// Whether `id` is an effect of a file with a `lag(…)` or `delay(…)` term.
+/// Whether `id` is an effect from a file with a `lag(…)` or `delay(…)` term in its formula.
 fn remembers(id: &str) -> bool {
     register::find(id).is_some_and(|effect| !effect.memories().is_empty())
 }
 
 /// The free coefficients of `model`; `added` are the identifiers of added effects.
 ///
-/// A coefficient with a prior is held if its prior standard deviation is zero. The prior standard deviation of a coefficient
-/// of an added effect is the range of its bounds, or a share of this range for a curve. The shape constants of a formula are
-/// held if a curve replaces its shape.
+/// A coefficient of the given model is held if its prior standard deviation is zero. The prior standard deviation of a
+/// coefficient of an added effect is the range of its bounds, or a fraction of this range for a curve. The shape constants
+/// of a formula are held if a curve replaces the formula.
 pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
     let linear = model.linear();
     let named = model.coefficients().iter().zip(linear).enumerate();
@@ -112,8 +113,8 @@ pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
         .collect()
 }
 
-/// `model` with physical bounds as its only prior. Every coefficient in which the model is linear, zero or not, has the range
-/// of its bounds as prior standard deviation.
+/// `model` with physical bounds as its only prior. The prior standard deviation of every coefficient in which the model is
+/// linear is the range of its bounds, even if the coefficient is zero.
 pub(super) fn from_scratch(model: &GreyBox) -> GreyBox {
     let linear = model.linear();
     let names: Vec<&str> = model.coefficients().iter().map(|c| c.name.as_str()).collect();
@@ -136,7 +137,7 @@ pub(super) fn held_at_zero(model: &GreyBox) -> Vec<String> {
     known.map(|c| c.name.clone()).collect()
 }
 
-/// Effects of `model` whose shape constants are held, each with the curve that replaces its shape.
+/// Effects of `model` whose shape constants are held, each with the curve that replaces its formula.
 pub(super) fn taken_over(model: &GreyBox) -> impl Iterator<Item = (&'static str, &'static str)> {
     let both = TAKES_OVER.iter().filter(|(by, of)| model.has(by) && model.has(of));
     both.map(|(by, of)| (*of, *by))
@@ -153,7 +154,8 @@ pub(super) fn with(model: &GreyBox, free: &[Free], values: &[f64]) -> GreyBox {
     changed
 }
 
-/// Models with the free coefficient number `place` perturbed about `values`, and the difference of the coefficient.
+/// Models for a finite difference with respect to the free coefficient number `place` at `values`, and the difference of
+/// the coefficient between them.
 ///
 /// Differences are one-sided for coefficients in which the model is linear; the first model is then `None`. They are central
 /// for all other coefficients.

@@ -14,7 +14,7 @@ use crate::flight_path::reconstruction::Reconstruction;
 use crate::progress::Progress;
 use greylag_model::GreyBox;
 
-/// A model estimated by equation error only, from forces and moments without free runs.
+/// A model estimated by equation error only: from forces and moments, without free runs.
 #[derive(Clone, Debug)]
 pub struct Estimate {
     /// The estimated model.
@@ -23,7 +23,7 @@ pub struct Estimate {
     pub after: Vec<HorizonScore>,
 }
 
-/// Fits the coefficients of `model` to `flights` without added effects: the value of [`Options::tuned`].
+/// Fits the coefficients of `model` to `flights` without added effects. The result is suitable for [`Options::tuned`].
 ///
 /// # Errors
 /// The flights do not allow a fit (see `AmendError`), or `progress` cancelled.

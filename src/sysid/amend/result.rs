@@ -18,7 +18,7 @@ pub struct Parameter {
     pub name: String,
     /// Meaning, with its unit.
     pub meaning: &'static str,
-    /// Whether it belongs to an added effect.
+    /// Whether the coefficient belongs to an added effect.
     pub added: bool,
     /// Value before the fit.
     pub prior: f64,
@@ -30,9 +30,9 @@ pub struct Parameter {
     pub sd: f64,
     /// 95 % interval of `value`.
     pub ci95: [f64; 2],
-    /// Whether the estimate is at a bound of what is physically possible.
+    /// Whether the estimate is at a bound of the physically possible range.
     pub at_bound: bool,
-    /// Estimates of each flight alone, to first order.
+    /// Estimates from each flight alone, to first order.
     pub by_flight: Vec<FlightEstimate>,
     /// Coefficient of the model with which this coefficient of an added effect is confounded (error correlation above
     /// 0.9); `None` if there is none.
@@ -46,7 +46,7 @@ pub struct FlightEstimate {
     pub flight: String,
     /// Estimate from this flight and the prior.
     pub value: f64,
-    /// Standard deviation of `value`, the prior included.
+    /// Standard deviation of `value`, with the information of the prior.
     pub sd: f64,
 }
 
@@ -59,13 +59,13 @@ pub struct FittedFlight {
     pub seconds: f64,
     /// Delay of the recorded actuators, s, and its standard deviation.
     pub actuators_late_s: [f64; 2],
-    /// Remaining scale error of its airspeed (relative), and its standard deviation.
+    /// Remaining relative scale error of the airspeed, and its standard deviation.
     pub airspeed_scale: [f64; 2],
     /// Remaining bias of the angle-of-attack vane, rad, and its standard deviation.
     pub alpha_bias_rad: [f64; 2],
     /// Remaining bias of the sideslip vane, rad, and its standard deviation.
     pub beta_bias_rad: [f64; 2],
-    /// Its trims and misalignment angles, where they were estimated.
+    /// Trims and misalignment angles of the flight; empty unless they were estimated.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub own: Vec<OwnConstant>,
 }
@@ -74,13 +74,13 @@ pub struct FittedFlight {
 #[derive(Clone, Debug, Serialize)]
 pub struct OwnConstant {
     /// `askew_roll`, `askew_pitch`, `askew_yaw` (rad), or one of the trims `CD0`, `CL0`, `CY0`, `Cl0`, `Cm0`, `Cn0`,
-    /// `thrust_share` (dimensionless), which are added to the model's coefficients in this flight.
+    /// `thrust_share` (dimensionless). The trims are added to the model's coefficients in this flight.
     pub name: &'static str,
     /// Prior standard deviation, about zero.
     pub prior_sd: f64,
     /// Estimate, in the unit of `name`.
     pub value: f64,
-    /// Standard deviation of `value`, the uncertainty of the model's own coefficient included.
+    /// Standard deviation of `value`, including the uncertainty of the model's own coefficient.
     pub sd: f64,
     /// Estimate less the mean of all flights, and its standard deviation; `None` for a single flight.
     pub beside_mean: Option<[f64; 2]>,
@@ -118,11 +118,11 @@ pub struct AddedEffect {
     pub id: String,
     /// Description of the effect, in one sentence.
     pub description: &'static str,
-    /// Whether it joined the amended model.
+    /// Whether the effect was added to the amended model.
     pub joined: bool,
-    /// Reasons to reject it, from its estimates and the held-out flights; empty if there are none.
+    /// Reasons to reject the effect, from its estimates and the held-out flights; empty if there are none.
     pub refused: Vec<String>,
-    /// Manoeuvre that would let the data decide.
+    /// Manoeuvre whose data would decide whether the aircraft has this effect; empty if none is known.
     pub fly_next: String,
 }
 
@@ -133,7 +133,7 @@ pub struct Settings {
     pub lengths_s: Vec<f64>,
     /// Horizons of the free runs, s.
     pub horizons_s: Vec<f64>,
-    /// Horizon at which improvement is judged, s.
+    /// Longest horizon at which models are compared, s.
     pub judged_at_s: f64,
     /// Constants estimated for each flight.
     #[serde(flatten)]
@@ -167,22 +167,23 @@ pub struct Amendment {
     pub held_out: Vec<String>,
     /// Held-out free-run errors of the model as given.
     pub given: Vec<HorizonScore>,
-    /// Held-out free-run errors with its coefficients tuned.
+    /// Held-out free-run errors of the tuned model without added effects.
     pub before: Vec<HorizonScore>,
-    /// Held-out free-run errors with the effects added.
+    /// Held-out free-run errors of the amended model.
     pub after: Vec<HorizonScore>,
-    /// Mean of ln(scaled error of the model as given / scaled error of the fit), paired over the free runs of the held-out flights,
-    /// and its standard error, at the longest horizon up to `judged_at_s` that two runs reach; `None` if there is none. A fit
-    /// without a prior is compared at the longest horizon that a run reaches, and has `None` if only one does.
+    /// Mean of ln(scaled error of the model as given / scaled error of the fit) over the held-out free runs, and its
+    /// standard error. The errors are taken at the longest horizon up to `judged_at_s` that at least two runs reach; `None`
+    /// if there is no such horizon. A fit without a prior is compared at the longest horizon that any run reaches; `None`
+    /// if only one run reaches it.
     pub decrease: Option<[f64; 2]>,
-    /// Further notes for the reader.
+    /// Further notes for the user, in sentences.
     pub notes: Vec<String>,
     /// Settings of the amendment.
     pub settings: Settings,
 }
 
 impl Amendment {
-    /// Sentence that the given model is kept because the fit predicts the validation flights worse; `None` if it does
+    /// Sentence that the given model is kept because the fit predicts the validation flights worse; `None` if the fit does
     /// not.
     pub fn worse(&self) -> Option<String> {
         let (given, after) = (judged(&self.given)?, judged(&self.after)?);
@@ -190,11 +191,11 @@ impl Amendment {
             .then(|| self.kept("the fit predicts the flights for validation worse"))
     }
 
-    /// Sentence that the given model is kept because only its coefficients were tuned and the 95 % interval of
-    /// `decrease` includes zero; `None` otherwise.
+    /// Sentence that the given model is kept because only its coefficients were tuned and the 95 % interval of `decrease`
+    /// does not lie above zero; `None` otherwise.
     pub fn by_chance(&self) -> Option<String> {
         let [mean, error] = self.decrease?;
-        // plus zero: no −0
+        // adding zero turns −0 into 0
         let percent = |sd: f64| (100.0 * (1.0 - (-(mean + sd * error)).exp())).round() + 0.0;
         (self.only_tuned() && mean < CLEAR * error).then(|| {
             self.kept(&format!(
@@ -218,7 +219,7 @@ impl Amendment {
         })
     }
 
-    /// Sentence that the given model is kept, with the reason `why` and the errors if a free run has any.
+    /// Sentence that the given model is kept, with the reason `why`, and with the held-out errors if there are any.
     fn kept(&self, why: &str) -> String {
         let errors = judged(&self.given).zip(judged(&self.after)).zip(judged_at(&self.given));
         let errors = errors.map_or(String::new(), |((given, after), seconds)| {

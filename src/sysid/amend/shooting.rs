@@ -15,7 +15,7 @@ const LEFT: f64 = 0.7;
 /// Shortest shot that is fitted, s.
 pub(super) const SHORTEST_S: f64 = 0.4;
 
-/// A shot: a part of a segment that a free run of the model covers.
+/// A shot: a part of a segment that one free run of the model covers.
 #[derive(Clone, Debug)]
 pub(super) struct Shot {
     pub flight: usize,
@@ -61,7 +61,8 @@ pub(super) fn acting(
     flight.segments.iter().map(|segment| act(model, flight, segment, record)).collect()
 }
 
-/// Deflections that act during each model step of a segment, `substeps` steps for each sample.
+/// Deflections that act during each model step of a segment. Each sample has `substeps` model steps. The record is late by
+/// `late` sampling intervals and has the given `blur`.
 fn act(
     model: &GreyBox,
     flight: &Prepared,
@@ -105,7 +106,7 @@ fn between(segment: &[Instant], place: f64, blur: f64) -> Controls {
     }
 }
 
-/// Changes of the state per rad of each misalignment angle.
+/// Changes of the measured state per rad of each misalignment angle.
 pub(super) fn turned(flight: &Prepared, state: &[f64; 8]) -> [[f64; 8]; askew::NAMES.len()] {
     askew::state(&flight.turning, state)
 }
@@ -126,7 +127,7 @@ pub(super) fn offset(flight: &Prepared, own: &Own, state: &[f64; 8]) -> [f64; 8]
     offset
 }
 
-/// Initial state of a shot: reconstructed state less the sensors' errors plus `from`.
+/// Initial state of a shot: the reconstructed state less the sensors' errors, plus the error `from` of the initial state.
 pub(super) fn start(shot: &Shot, flight: &Prepared, own: &Own, from: &[f64; 8]) -> [f64; 8] {
     let measured = flight.segments[shot.segment][shot.start].state.to_array();
     let offset = offset(flight, own, &measured);
@@ -170,15 +171,16 @@ pub(super) fn fly(
     path
 }
 
-/// Predicted − measured states, in the units of the state, with roll wrapped to ±π. Weak form and report use the opposite sign.
+/// Predicted − measured states, in the units of the state, with roll wrapped to ±π. The weak form and the report use the
+/// opposite sign.
 pub(super) fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
     let mut error: [f64; 8] = std::array::from_fn(|k| predicted[k] - measured[k]);
     error[0] = (error[0] + PI).rem_euclid(TAU) - PI;
     error
 }
 
-/// Predicted − measured at the compared samples of a shot, with the sensors' errors added to the prediction. The last error
-/// before divergence is held. `scale` is x_c.
+/// Predicted − measured states at the compared samples of a shot. The sensors' errors are added to the prediction. After
+/// divergence, the residual keeps its last value. `scale` is the reference scale x_c of the state.
 pub(super) fn residuals(
     flight: &Prepared,
     shot: &Shot,
@@ -187,7 +189,7 @@ pub(super) fn residuals(
     path: &[[f64; 8]],
 ) -> Vec<[f64; 8]> {
     let segment = &flight.segments[shot.segment];
-    // a run that diverges in its first step has the errors at which a run counts as diverged
+    // a run that diverges in its first step gets the error at which a run counts as diverged
     let mut last = scale.map(|x| LEFT * x);
     (0..shot.steps)
         .map(|k| {
@@ -208,7 +210,7 @@ mod tests {
 
     #[test]
     fn a_record_of_means_is_undone() {
-        // 3 Hz at 100 samples a second; each record is the mean of two adjacent samples and therefore half a sample late
+        // 3 Hz at 100 samples per second; each record is the mean of two adjacent samples and therefore half a sample late
         let true_value = |k: usize| (0.19 * k as f64).sin();
         let instant = |k: usize| {
             let aileron = 0.5 * (true_value(k) + true_value(k.saturating_sub(1)));

@@ -5,7 +5,7 @@ use super::judge::judged;
 use super::result::Amendment;
 use crate::per_flight::PerFlight;
 
-/// Sentences on the amendment in addition to its answer: conventions and refused effects.
+/// Sentences on conventions and refused effects, in addition to the amendment's answer.
 pub fn sentences(story: &Amendment) -> Vec<String> {
     let mut all = Vec::new();
     let (before, after) = (judged(&story.before), judged(&story.after));
@@ -14,7 +14,7 @@ pub fn sentences(story: &Amendment) -> Vec<String> {
     let taken = story.conventions.iter().filter(|t| t.kept);
     let taken: Vec<String> =
         taken.map(|t| format!("{} {}", t.convention.key().join("."), t.to)).collect();
-    // the answer covers tuning and effects, so a sentence follows only if a convention changed
+    // the answer already covers tuning and effects: a sentence is needed only if a convention changed
     if let (Some(before), Some(after), false) = (before, after, taken.is_empty()) {
         let joined = kept.iter().map(|id| (*id).to_owned());
         all.push(format!(
@@ -50,7 +50,7 @@ pub fn sentences(story: &Amendment) -> Vec<String> {
     all
 }
 
-/// Sentence on the use of the constants `asked` of each flight after the fit; `None` if there are none.
+/// Sentence on how the constants `asked` of each flight are used after the fit; `None` if no constants are asked for.
 pub fn apart(asked: &PerFlight) -> Option<String> {
     let what = match (asked.has_trims(), asked.angles() > 0) {
         (false, false) => return None,

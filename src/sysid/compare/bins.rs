@@ -8,7 +8,7 @@ use crate::weak_form::prepared::Prepared;
 use crate::weak_form::windows::Series;
 use greylag_num::statistics::{mean, quantile};
 
-/// Smallest number of independent samples with which a bin counts as supported.
+/// Smallest number of independent samples in a bin that counts as supported.
 pub const SUPPORT: usize = 20;
 /// Intended number of bins between the outermost edges.
 const BINS: f64 = 8.0;
@@ -34,7 +34,7 @@ pub struct Residual {
     pub shift: Shift,
 }
 
-/// The finite residuals of `channel` over all flights; `series` and `shifts` hold one list for each flight.
+/// The finite residuals of `channel` over all flights. `series` and `shifts` hold one list for each flight.
 pub fn residuals(
     channel: ChannelId,
     flights: &[Prepared],
@@ -170,7 +170,7 @@ fn statistics(members: &[&Residual], seed: u64, path: &[u64]) -> Bin {
     }
 }
 
-/// Share of the variance that the group means explain, adjusted for the number of groups.
+/// Fraction of the variance that the group means explain, adjusted for the number of groups.
 fn explained(groups: &[Vec<&Residual>]) -> f64 {
     let total: Vec<f64> = groups.iter().flatten().map(|r| r.value).collect();
     let squares = |of: &[f64]| {
@@ -186,14 +186,15 @@ fn explained(groups: &[Vec<&Residual>]) -> f64 {
     if share.is_finite() && count > k { share.clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// Share of the samples in each end bin: 1.2 times the share that supports a bin, limited to 2 to 20 %.
+/// Fraction of the samples in each of the two open end bins: 1.2 times the fraction that supports a bin, limited to 2 to 20
+/// %.
 fn tail(independent: usize) -> f64 {
     (1.2 * SUPPORT as f64 / independent as f64).clamp(0.02, 0.2)
 }
 
-/// Share of the variance that a straight line over `values` explains, adjusted for its two parameters.
+/// Fraction of the variance that a straight line over `values` explains, adjusted for its two parameters.
 ///
-/// Bins are too coarse if a few extreme values cause most of the variance.
+/// Bins alone would be too coarse if a few extreme values cause most of the variance.
 fn along_a_line(values: &[f64], residuals: &[Residual]) -> f64 {
     let (mx, my) =
         (mean(values), residuals.iter().map(|r| r.value).sum::<f64>() / values.len() as f64);
@@ -266,8 +267,8 @@ pub fn map(residuals: &[Residual]) -> Map {
 
 /// Edges of the map's cells along regime variable `v` (0: α, 1: β), °.
 ///
-/// The edges lie between the 2 % and 98 % quantiles. One more cell is added at each end, and values beyond it are left out
-/// of the map. A nearly constant variable has a single cell of 1°.
+/// The edges lie between the 2 % and 98 % quantiles. One more cell is added at each end. Values beyond these cells are left
+/// out of the map. A nearly constant variable has a single cell of 1°.
 fn side(residuals: &[Residual], v: usize) -> Vec<f64> {
     let values: Vec<f64> = residuals.iter().map(|r| r.regime[v]).collect();
     let mut edges = edges(&values, MAP_BINS, 0.02).filter(|e| e.len() > 1).unwrap_or_default();
@@ -296,7 +297,7 @@ mod tests {
     #[test]
     fn a_step_over_alpha_is_explained_by_alpha_and_not_by_time() {
         let residual = |i: usize| {
-            // a permutation: alpha and time are not correlated
+            // the order is permuted, so that alpha and time are not correlated
             let alpha = (i * 37 % 100) as f64 / 10.0;
             let mut regime = [0.0; 13];
             (regime[0], regime[12]) = (alpha, i as f64);
@@ -309,7 +310,7 @@ mod tests {
         let share = |v| found.iter().find(|b| b.variable == v).map_or(f64::NAN, |b| b.explained);
         assert!(share(RegimeVariable::Alpha) > 0.8, "{}", share(RegimeVariable::Alpha));
         assert!(share(RegimeVariable::Time) < 0.1, "{}", share(RegimeVariable::Time));
-        // constants have no bins
+        // constant variables have no bins
         assert!(found.iter().all(|b| b.variable != RegimeVariable::Beta));
         let high = found[0].bins.last().unwrap();
         assert!(high.mean > 3.0 && high.low >= 8.0 && high.high.is_nan() && high.supported);

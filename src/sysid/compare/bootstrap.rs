@@ -64,8 +64,8 @@ mod tests {
 
     #[test]
     fn intervals_cover_the_mean_of_blocky_noise_about_as_often_as_they_say() {
-        // 5 equal samples a block: an interval that treated the samples as independent would be too narrow by the factor
-        // sqrt(5) and cover the mean in about 62 %
+        // each block has 5 equal samples: an interval that treated the samples as independent would be too narrow by the
+        // factor sqrt(5) and would cover the mean in only 62 % of the cases
         let covered = (0..200)
             .filter(|&trial| {
                 let mut random = stream(trial, &[1]);

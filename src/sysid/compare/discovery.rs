@@ -2,8 +2,9 @@
 //!
 //! A cell is a channel in a bin of a regime variable. A model has several hundred cells. By chance, one in twenty of them
 //! has a 95 % interval that excludes zero. Benjamini and Hochberg's procedure (J. R. Stat. Soc. B 57, 1995, p. 289) limits
-//! the expected share of such cells among the reported ones to 5 %. Cells that share windows are positively dependent.
-//! The procedure remains valid under positive dependence (Benjamini and Yekutieli, Ann. Stat. 29, 2001, p. 1165).
+//! the expected fraction of such false cells among the reported cells to 5 %. Cells that share windows are positively
+//! dependent. The procedure remains valid under positive dependence (Benjamini and Yekutieli, Ann. Stat. 29, 2001, p.
+//! 1165).
 
 use super::doubt::NORMAL_95;
 use super::result::{Bin, RegimeBins};
@@ -88,7 +89,7 @@ mod tests {
         }
         // the expected share is 0.05 × 180 / 200; its standard error over 200 trials is 0.004
         assert!(shares / 200.0 < 0.06, "{}", shares / 200.0);
-        // without the procedure, 95 % intervals would report 9 false cells a trial, a third of all reported cells
+        // without the procedure, 95 % intervals would report 9 false cells in each trial, a third of all reported cells
         assert!(hits as f64 / (200.0 * 20.0) > 0.85, "{hits}");
     }
 

@@ -15,8 +15,8 @@ use greylag_physics::{Controls, State};
 /// Half width of a 95 % interval in standard deviations of a normal distribution.
 pub const NORMAL_95: f64 = 1.96;
 
-/// Adds an error of a sensor constant to an instant. Arguments: the instant, the rates of the controls (rad/s, throttle 1/s),
-/// the size of the error in the constant's unit.
+/// Adds the error of one sensor constant to an instant. The arguments are the instant, the rates of the controls (rad/s,
+/// throttle 1/s), and the error in the constant's unit.
 type Move = fn(&mut Instant, &Controls, f64);
 
 /// Sensor constants that shift a residual.
@@ -42,7 +42,7 @@ const CONSTANTS: [(&str, Move); COUNT] = [
 /// Number of sensor constants that shift a residual.
 pub const COUNT: usize = 12;
 
-/// Shift of a residual for one standard deviation of each constant, in the channel's unit.
+/// Shift of a residual for an error of one standard deviation in each constant, in the channel's unit.
 pub type Shift = [f64; COUNT];
 
 /// Shifts of every channel's residual, `[window][channel]` in the order of [`ChannelId::ALL`].

@@ -12,7 +12,7 @@ pub enum CompareError {
     /// No flight is given.
     #[error("nothing to compare with: name at least one flight log (--log)")]
     NoLog,
-    /// No log holds a usable flight; the value is the reason for each log.
+    /// No log holds a usable flight. The value states the reason for each log.
     #[error(
         "no flight to compare with: {0}; give a log in which the aircraft flies for some seconds without gaps"
     )]

@@ -7,16 +7,16 @@ use super::result::{Bin, Regime, RegimeBins};
 use crate::weak_form::channels::RegimeVariable;
 use crate::weak_form::prepared::Prepared;
 
-/// A variable must explain at least this share of the residual's variance to define a regime.
+/// A variable must explain more than this fraction of the residual's variance to define a regime.
 const SHARE_FLOOR: f64 = 0.1;
-/// Time, altitude or flight must explain a share of the variance that is larger by this than that of any other variable to
-/// define a regime.
+/// Time, altitude and flight define a regime only if the fraction of the variance that they explain exceeds those of the
+/// other variables by this margin.
 const CIRCUMSTANCE_MARGIN: f64 = 0.15;
-/// A residual follows a variable that explains more than this share of its variance.
+/// A residual mainly depends on a variable that explains more than this fraction of its variance.
 const FOLLOWS: f64 = 0.5;
 /// An adjacent bin belongs to the worst range if its mean is at least this fraction of the worst bin's mean.
 const RANGE_PART: f64 = 0.5;
-/// Smallest number of independent samples of a flight that can show a regime.
+/// A flight is named as showing a regime only if it has at least this number of independent samples in the regime.
 const FLIGHT_SUPPORT: usize = 5;
 
 /// Trend of the residual along the variable.
@@ -37,14 +37,14 @@ pub enum Trend {
 pub struct Finding {
     /// The regime with its range and mean residual.
     pub regime: Regime,
-    /// Trend along its variable.
+    /// Trend of the residual along the regime's variable.
     pub trend: Trend,
 }
 
 /// The worst regime of a channel.
 ///
-/// If no variable defines a regime, the regime is the whole of the flights. `None` if the mean residual of the whole flights
-/// does not differ from zero either, or has too few samples.
+/// If no variable defines a regime, the regime comprises all samples. `None` if the mean residual over all samples does not
+/// differ significantly from zero, or if there are too few samples.
 pub fn worst(
     residuals: &[Residual],
     bins: &[RegimeBins],
@@ -74,7 +74,7 @@ pub fn worst(
     Some(Finding { regime, trend })
 }
 
-/// The variable that a residual mainly follows, even if none of its bins has enough samples.
+/// The variable on which a residual mainly depends, even if none of its bins has enough samples.
 pub fn follows(bins: &[RegimeBins]) -> Option<RegimeVariable> {
     most_informative(bins).filter(|b| b.explained > FOLLOWS).map(|b| b.variable)
 }
@@ -83,8 +83,8 @@ fn excludes_zero([low, high]: [f64; 2]) -> bool {
     low > 0.0 || high < 0.0
 }
 
-/// Bins of the variable that explains the largest share of the variance. Time, altitude and flight must exceed the others by
-/// `CIRCUMSTANCE_MARGIN`.
+/// Bins of the variable that explains the largest fraction of the variance. Time, altitude and flight must exceed the
+/// others by `CIRCUMSTANCE_MARGIN`.
 fn most_informative(bins: &[RegimeBins]) -> Option<&RegimeBins> {
     use RegimeVariable::{Altitude, Flight, Time};
     let worth = |b: &RegimeBins| {
@@ -95,7 +95,7 @@ fn most_informative(bins: &[RegimeBins]) -> Option<&RegimeBins> {
     (worth(best) > SHARE_FLOOR).then_some(best)
 }
 
-/// Whether the residual is a constant offset rather than a function of the variable.
+/// Whether the residual is a nearly constant offset rather than a function of the variable.
 fn is_constant(residuals: &[Residual], decisive: &RegimeBins) -> bool {
     let count = residuals.len() as f64;
     let mean = residuals.iter().map(|r| r.value).sum::<f64>() / count;
@@ -103,7 +103,8 @@ fn is_constant(residuals: &[Residual], decisive: &RegimeBins) -> bool {
     decisive.explained * (square - mean * mean) < 0.1 * mean * mean
 }
 
-/// Indices of the first and last of the adjacent bins around the bin that differs most significantly from zero.
+/// Indices of the first and the last bin of the worst range. The range contains the bin whose mean differs most
+/// significantly from zero, and adjacent bins with similar means.
 fn range(bins: &[Bin]) -> Option<(usize, usize)> {
     let sure = |b: &Bin| b.interval[0].abs().min(b.interval[1].abs());
     let peak = (0..bins.len())
@@ -151,15 +152,15 @@ fn regime(
     }
 }
 
-/// (model − measured) / measured, from the means over the windows, %. NaN unless nine in ten measured values have the sign of
-/// their mean.
+/// (model − measured) / measured, from the means over the windows, %. NaN unless at least 90 % of the measured values have
+/// the sign of their mean.
 fn relative_percent(inside: &[&Residual], mean: f64) -> f64 {
     let measured = inside.iter().map(|r| r.measured).sum::<f64>() / inside.len() as f64;
     let same = inside.iter().filter(|r| r.measured * measured > 0.0).count() as f64;
     if same >= 0.9 * inside.len() as f64 { -100.0 * mean / measured } else { f64::NAN }
 }
 
-/// Trend of the supported bins' means along the variable; none for fewer than four supported bins.
+/// Trend of the supported bins' means along the variable; `Trend::None` for fewer than four supported bins.
 fn trend(bins: &[Bin]) -> Trend {
     let known: Vec<&Bin> = bins.iter().filter(|b| b.supported).collect();
     if known.len() < 4 {

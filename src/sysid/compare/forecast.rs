@@ -58,7 +58,8 @@ impl Forecast {
         }
     }
 
-    /// One run from sample `start` of `segment`. The run is sampled after each number of steps in `looks`.
+    /// One run from sample `start` of `segment`. Returns the measured and predicted state after each number of steps in
+    /// `looks`.
     pub(super) fn run(
         &self,
         segment: &[Instant],

@@ -33,12 +33,13 @@ pub struct Runs {
     scale: [f64; 8],
 }
 
-/// The predicted states of runs restarted every [`START_EVERY_S`], at the times of
-/// [`FlightTrace`](super::result::FlightTrace) and in the order and units of `State::NAMES`.
+/// The predicted states of free runs that restart every [`START_EVERY_S`]. The times are those of
+/// [`FlightTrace`](super::result::FlightTrace), the order and the units those of `State::NAMES`.
 pub type Trace = [Vec<f64>; 8];
 
 /// Free runs of `model` over all `flights`, sampled at the `horizons` (s) and at the points of the growth curve up to the
-/// longest horizon. Constants of a flight in the model's file (trims, sensor errors) are applied to that flight.
+/// longest horizon. Constants of a flight in the model's file (trims, sensor errors) are applied to that flight. Returns
+/// also one trace for each flight.
 pub fn fly(model: &GreyBox, flights: &[Prepared], horizons: &[f64]) -> (Runs, Vec<Trace>) {
     fly_with(model, flights, horizons, None)
 }
@@ -73,8 +74,8 @@ pub fn fly_with(
 /// Largest relative difference between a horizon and the time of the sample at which its error is computed.
 const UNEVEN: f64 = 0.25;
 
-/// A note for each horizon (s) that the samples of a flight hardly reach. `steps` holds the names of the flights and
-/// their sampling intervals, s.
+/// A note for each flight and horizon (s) for which no sample is close to the horizon. `steps` holds the names of the
+/// flights and their sampling intervals, s.
 pub fn uneven(steps: &[(&str, f64)], horizons: &[f64]) -> Vec<String> {
     let mut notes = Vec::new();
     for (name, dt) in steps {
@@ -143,7 +144,7 @@ fn fly_one(
 /// Largest number of runs whose paths are in memory before they are appended to the trace.
 const RUNS_AT_A_TIME: usize = 256;
 
-/// States of a run that starts at one time of a flight.
+/// Predicted states of a single free run.
 #[derive(Clone, Debug, Default)]
 pub struct Path {
     /// Time on the log's clock, s.
@@ -228,8 +229,8 @@ fn run(
     (seen, path)
 }
 
-/// Predicted − measured states, in the units of `State::NAMES`, with roll wrapped to ±π. Weak form and report use the opposite
-/// sign.
+/// Predicted − measured states, in the units of `State::NAMES`, with roll wrapped to ±π. The weak form and the report use
+/// the opposite sign.
 pub fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
     let mut error: [f64; 8] = std::array::from_fn(|k| predicted[k] - measured[k]);
     error[0] = (error[0] + PI).rem_euclid(TAU) - PI;
@@ -267,7 +268,7 @@ impl Runs {
         self.errors(&self.at(horizon_s))
     }
 
-    /// The errors at `horizon_s` (s), one of the sampled times.
+    /// The errors over all runs at `horizon_s` (s), one of the sampled times.
     pub fn score(&self, horizon_s: f64) -> HorizonScore {
         let looks = self.at(horizon_s);
         let diverged = looks.iter().filter(|l| l.is_none()).count();
@@ -299,7 +300,7 @@ impl Runs {
         self.times.iter().map(point).filter(|p| p.runs > 0).collect()
     }
 
-    /// RMSE, R² and Theil's U with its shares for state number `k`.
+    /// RMSE, R², Theil's U and Theil's proportions for state number `k`.
     fn state_score(&self, k: usize, runs: &[[[f64; 8]; 2]]) -> StateScore {
         let measured: Vec<f64> = runs.iter().map(|r| r[0][k]).collect();
         // measured plus wrapped error: a roll error across ±180° is then the smaller angle
@@ -361,7 +362,7 @@ mod tests {
         let offset = runs(|x| x + 0.1).score(1.0);
         let s = &offset.states[1];
         assert!((s.rmse - 0.1).abs() < 1e-12 && (s.bias_share - 1.0).abs() < 1e-9);
-        // twice the measured: RMSE = RMS of measured, so U = 1/(2 + 1)
+        // the prediction is twice the measured value: the RMSE equals the RMS of the measured values, so U = 1/(2 + 1)
         let doubled = runs(|x| 2.0 * x).score(1.0);
         let s = &doubled.states[1];
         assert!((s.theil_u - 1.0 / 3.0).abs() < 1e-12 && (s.variance_share - 1.0).abs() < 1e-9);
@@ -376,7 +377,7 @@ mod tests {
         assert_eq!((score.runs, score.diverged, score.divergence_rate), (2, 1, 0.5));
         assert!((score.rmse_scaled - DIVERGENCE_BOUND / 2_f64.sqrt()).abs() < 1e-12);
         assert_eq!(score.states[2].rmse, 0.0);
-        // without an error, none of its shares is defined
+        // Theil's proportions of a zero error are not defined
         let s = &score.states[2];
         assert!(s.bias_share.is_nan() && s.variance_share.is_nan() && s.covariance_share.is_nan());
         // a roll of 179° predicted as −179° has an error of 2°

@@ -1,12 +1,12 @@
-//! Constants of the compared flights in a model's file, and the free-run errors with and without them.
+//! Free-run errors with and without the constants of the compared flights in a model's file.
 
 use super::free_run;
 use super::result::{HorizonScore, KnownUse};
 use crate::weak_form::prepared::Prepared;
 use greylag_model::GreyBox;
 
-/// Flights with constants in the file of `model`, and the free-run errors without these constants at `horizons_s` (s). `None`
-/// if the file has no constants for these flights.
+/// The flights with constants in the file of `model`, and the free-run errors of all flights without these constants, at
+/// `horizons_s` (s). `None` if the file has no constants for these flights.
 pub fn used(model: &GreyBox, flights: &[Prepared], horizons_s: &[f64]) -> Option<KnownUse> {
     let (own, shared): (Vec<&Prepared>, Vec<_>) =
         flights.iter().partition(|f| model.known.names(&f.name));

@@ -2,7 +2,8 @@
 
 use super::bins::Residual;
 
-/// The unexplained share is defined only if the channel's variance beyond noise is more than this share of its total variance.
+/// The unexplained fraction is defined only if the channel's variance beyond noise is more than this fraction of its total
+/// variance.
 const EXCITED: f64 = 0.05;
 
 /// Mean squares of a channel, in its unit squared.
@@ -13,7 +14,7 @@ pub struct Power {
     pub residual: f64,
     /// Variance of the sensor noise.
     pub noise: f64,
-    /// Share of the mean square residual due to the mean residual, 0 to 1.
+    /// Fraction of the mean square residual that is due to the mean residual, 0 to 1.
     pub offset: f64,
 }
 
@@ -32,7 +33,7 @@ impl Power {
         }
     }
 
-    /// Unexplained share of the variance beyond noise; NaN if the variance hardly exceeds the noise.
+    /// Unexplained fraction of the channel's variance beyond noise; NaN if the variance hardly exceeds the noise.
     pub fn unexplained(&self) -> f64 {
         let signal = self.measured - self.noise;
         if signal > EXCITED * self.measured {

@@ -28,7 +28,7 @@ pub struct Comparison {
     pub forecasts: Vec<ForecastResult>,
     /// The flights, in the order of the command line.
     pub flights: Vec<FlightResult>,
-    /// Settings that the figures depend on.
+    /// Settings on which the results depend.
     pub settings: Settings,
     /// Notes on skipped flights, assumptions and lost accuracy.
     pub notes: Vec<String>,
@@ -55,7 +55,7 @@ impl Comparison {
     }
 }
 
-/// Settings that the figures depend on.
+/// Settings on which the results of a comparison depend.
 #[derive(Clone, Debug, Serialize)]
 pub struct Settings {
     /// Time between the starts of free runs, s.
@@ -79,30 +79,31 @@ pub struct Settings {
 pub struct ModelResult {
     /// Name of the model, from its file.
     pub name: String,
-    /// Findings in sentences, in descending order of importance.
+    /// Findings on the model in sentences, in descending order of importance.
     pub sentences: Vec<String>,
     /// Free-run error at each horizon.
     pub free_run: Vec<HorizonScore>,
-    /// Constants of the flights in the model's file, which `free_run` uses; `None` if the file has none for these flights.
+    /// Flights for which `free_run` uses constants in the model's file, and the errors without these constants; `None` if
+    /// the file has none for these flights.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub known: Option<KnownUse>,
     /// Growth of the free-run error with time, from the start to the longest horizon.
     pub growth: Vec<GrowthPoint>,
-    /// Channels D, L, Y, l, m, n and the rates of V, α, β that the logs measure.
+    /// Results of the channels that the logs measure, among D, L, Y, l, m, n and the rates of V, α, β.
     pub channels: Vec<ChannelResult>,
-    /// Predictions over time, one entry a flight, in the order of [`Comparison::flights`].
+    /// Predictions over time, one entry for each flight, in the order of [`Comparison::flights`].
     #[serde(skip)]
     pub traces: Vec<ModelTrace>,
 }
 
-/// Constants of the flights in a model's file, and the errors of its free runs without them.
+/// Flights for which a model's file has constants, and the free-run errors without these constants.
 #[derive(Clone, Debug, Serialize)]
 pub struct KnownUse {
-    /// Flights with a table `[flights.NAME]` in the file.
+    /// Names of the flights with a table `[flights.NAME]` in the file.
     pub flights: Vec<String>,
-    /// Other flights, for which the file's `[installation]` is used.
+    /// Names of the flights without such a table, to which the file's `[installation]` is applied.
     pub by_installation: Vec<String>,
-    /// Free-run error without these constants, one entry a horizon.
+    /// Free-run error without these constants, one entry for each horizon.
     pub without: Vec<HorizonScore>,
 }
 
@@ -117,8 +118,9 @@ pub struct HorizonScore {
     pub diverged: usize,
     /// `diverged / runs`, 0 to 1; NaN without runs.
     pub divergence_rate: f64,
-    /// Root mean square, over runs, of the scaled error: the root mean square over the eight states of error / x_c (eq. 21). The
-    /// scaled error of a diverged run is the divergence bound.
+    /// Root mean square, over runs, of the scaled error. The scaled error is the root mean square over the eight states of
+    /// error / x_c, where x_c is the reference scale of a state. The scaled error of a diverged run is the divergence
+    /// bound.
     pub rmse_scaled: f64,
     /// Errors of each state over the runs that did not diverge.
     pub states: Vec<StateScore>,
@@ -140,18 +142,18 @@ pub struct StateScore {
     pub state: &'static str,
     /// Root mean square error, in the state's unit.
     pub rmse: f64,
-    /// Root mean square error divided by x_c.
+    /// Root mean square error divided by the reference scale x_c of the state.
     pub rmse_scaled: f64,
     /// Coefficient of determination over the runs: 1 − mean square error / variance of the measured state at the horizon. 1 is
     /// perfect; at 0 or below, the mean of the measured states would be at least as good a forecast.
     pub r2: f64,
     /// Theil's U: RMSE / (RMS of measured + RMS of predicted), 0 (perfect) to 1.
     pub theil_u: f64,
-    /// Share of the mean square error due to a constant offset, 0..1.
+    /// Theil's bias proportion: fraction of the mean square error due to a constant offset, 0..1.
     pub bias_share: f64,
-    /// Share of the mean square error due to different standard deviations of predicted and measured state, 0..1.
+    /// Theil's variance proportion: fraction due to different standard deviations of predicted and measured state, 0..1.
     pub variance_share: f64,
-    /// Share of the mean square error due to lack of correlation, 0..1. The three shares add up to 1.
+    /// Theil's covariance proportion: fraction due to lack of correlation, 0..1. The three proportions add up to 1.
     pub covariance_share: f64,
 }
 
@@ -195,7 +197,7 @@ pub struct ChannelResult {
     /// RMS rate of the scaled state error (error / x_c) that the residual beyond noise causes, 1/s. The values of different
     /// channels are comparable.
     pub effect_per_s: f64,
-    /// Share of the mean square residual due to a constant offset, 0..1.
+    /// Fraction of the mean square residual due to a constant offset, 0..1.
     pub offset_share: f64,
     /// The worst regime in one sentence.
     pub worst_regime: String,
@@ -229,10 +231,11 @@ pub struct RegimeBins {
     pub name: &'static str,
     /// Display unit of the variable: `°`, `°/s`, `m/s`, `m`, `s`, or empty.
     pub unit: &'static str,
-    /// Share of the residual's variance that the bins or a straight line explain, whichever is larger, 0..1. The share is
+    /// Fraction of the residual's variance that the bins or a straight line explain, whichever is larger, 0..1. It is
     /// adjusted for the number of parameters.
     pub explained: f64,
-    /// Bins in ascending order of the variable; for the variable flight, one bin a flight in the order of the flights.
+    /// Bins in ascending order of the variable. For the variable flight, one bin for each flight in the order of the
+    /// flights.
     pub bins: Vec<Bin>,
 }
 
@@ -252,8 +255,9 @@ pub struct Bin {
     /// 95 % interval of the mean: block bootstrap, widened by the uncertainty of the sensor errors estimated by the
     /// reconstruction.
     pub interval: [f64; 2],
-    /// Benjamini–Hochberg q-value, 0..1: expected share of false discoveries among the cells of the model that are at least as
-    /// significant as this cell. NaN without support. The model fails in cells with a q-value of at most 0.05.
+    /// Benjamini–Hochberg q-value, 0..1: expected fraction of false discoveries among the cells of the model that are at
+    /// least as significant as this cell. NaN if the bin is not supported. The model fails in cells with a q-value of at
+    /// most 0.05.
     pub q_value: f64,
     /// Mean of the measured channel, in its unit.
     pub measured: f64,
@@ -304,12 +308,12 @@ pub struct Regime {
     pub mean: f64,
     /// 95 % interval of `mean`.
     pub interval: [f64; 2],
-    /// Relative error (model − measured) / measured in the regime, from the means, %. NaN if the measured channel changes its
-    /// sign there.
+    /// Relative error (model − measured) / measured in the regime, from the means, %. NaN if more than 10 % of the measured
+    /// values have the opposite sign of their mean.
     pub relative_percent: f64,
     /// Number of independent samples.
     pub independent: usize,
-    /// Names of the flights in which the mean residual has the same sign, with enough samples.
+    /// Names of the flights in which the mean residual has the same sign, from enough samples.
     pub flights: Vec<String>,
 }
 

@@ -31,7 +31,7 @@ use crate::weak_form::prepared::{ClockError, Prepared};
 use crate::weak_form::windows::{self, Series};
 use greylag_model::GreyBox;
 
-/// Reasons why a channel is not assessed.
+/// This constant and the next two are reasons why a model is not assessed in a channel.
 const UNMOVED: &str = "these flights do not move it above the sensors' noise";
 const NOISE_UNKNOWN: &str =
     "its noise cannot be computed, because the model predicts no number beside a measured state";
@@ -140,8 +140,8 @@ pub fn scores_with(
 
 type Usable<'a> = (Vec<&'a Reconstruction>, Vec<Prepared>, Vec<String>);
 
-/// The flights that can be compared, with notes on the flights that are left out. `slowest` is the airspeed at which flight
-/// begins, m/s.
+/// The flights that can be compared (as reconstructions and prepared), with notes on the flights that are left out.
+/// `slowest` is the airspeed at which flight begins, m/s.
 fn usable(flights: &[Reconstruction], slowest: f64) -> Result<Usable<'_>, CompareError> {
     if flights.is_empty() {
         return Err(CompareError::NoLog);
@@ -235,7 +235,7 @@ fn one_model(
     }
 }
 
-/// For each measured channel, the reason why `flights` do not suffice to assess `model`, if there is one.
+/// Decides for each measured channel whether `flights` suffice to assess `model`.
 ///
 /// # Errors
 /// There is no flight, no flight is usable, or the sampling interval of a flight is not usable.
@@ -343,12 +343,12 @@ fn channel(
     }
 }
 
-/// Reason why the unexplained share of a channel with `power` is NaN, if it is.
+/// Reason for an undefined (NaN) unexplained fraction of a channel with `power`.
 fn unknown(power: &Power) -> &'static str {
     if power.noise.is_nan() { NOISE_UNKNOWN } else { UNMOVED }
 }
 
-/// Rate of the scaled state error (error / x_c) for one unit of a channel, 1/s per unit.
+/// Rate of the scaled state error (error / x_c) that one unit of a channel causes, 1/s per unit.
 fn leverage(model: &GreyBox, id: ChannelId) -> f64 {
     let [_, _, v, p, q, r, alpha, beta] = model.scale();
     let body = &model.body;

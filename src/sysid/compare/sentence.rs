@@ -4,24 +4,24 @@ use super::finding::{Finding, Trend};
 use super::result::Regime;
 use crate::weak_form::channels::{ChannelId, RegimeVariable};
 
-/// A channel counts as explained if its unexplained share of the variance is below this.
+/// A channel counts as explained if the unexplained fraction of its variance is below this.
 const EXPLAINED: f64 = 0.01;
-/// Unexplained share of the variance below which the sentence names no regime.
+/// Unexplained fraction of the variance below which the sentence names no regime.
 pub const NOTHING_LEFT: f64 = 0.001;
 
 /// Quantities from which the sentence of a channel is written.
 pub struct Subject<'a> {
     /// Identifier of the channel.
     pub channel: ChannelId,
-    /// Unexplained share of the channel's variance; NaN if it is not defined.
+    /// Unexplained fraction of the channel's variance; NaN if it is not defined.
     pub unexplained: f64,
     /// Reason for a NaN in `unexplained`.
     pub unknown: &'a str,
     /// Worst regime of the channel; `None` if there is none.
     pub finding: Option<&'a Finding>,
-    /// The variable that the residual mainly follows; `None` if there is none.
+    /// The variable on which the residual mainly depends; `None` if there is none.
     pub follows: Option<RegimeVariable>,
-    /// Whether the uncertainty of the sensor errors may account for the whole residual (95 %).
+    /// Whether the 95 % uncertainty of the sensor errors may explain the whole residual.
     pub within_doubt: bool,
     /// Mass of the aircraft in the model, kg.
     pub mass: f64,
@@ -29,7 +29,8 @@ pub struct Subject<'a> {
     pub flights: usize,
 }
 
-/// Unexplained share of the variance above which the sentence states no percentage: the channel is hardly excited.
+/// Unexplained fraction of the variance above which the sentence states no percentage, because the channel is hardly
+/// excited.
 const QUIET: f64 = 9.995;
 
 /// The sentence without a full stop; the first letter is lower case.
@@ -107,10 +108,10 @@ fn directions(channel: ChannelId) -> (&'static str, &'static str) {
     }
 }
 
-/// The error in words: "8.2 ± 0.3 N too low" or "28 ± 4 % too high".
+/// The model's error in words: "8.2 ± 0.3 N too low" or "28 ± 4 % too high".
 fn error(subject: &Subject, regime: &Regime) -> String {
     let [least, most] = regime.interval;
-    // half width on the side of zero: an interval that excludes zero must not appear to include zero
+    // the half width towards zero is used: an interval that excludes zero must not appear to include zero
     let half = if regime.mean > 0.0 { regime.mean - least } else { most - regime.mean };
     let (low, high) = directions(subject.channel);
     if subject.channel == ChannelId::Lift && regime.relative_percent.is_finite() {
@@ -133,7 +134,8 @@ fn error(subject: &Subject, regime: &Regime) -> String {
     }
 }
 
-/// For moments, the error relative to the measured moment. Empty if the measured moment changes its sign in the regime.
+/// Phrase on the error of a moment relative to the measured moment. Empty for other channels, and if the measured moment
+/// changes its sign in the regime.
 fn strength(channel: ChannelId, regime: &Regime) -> String {
     let moment = matches!(channel, ChannelId::Roll | ChannelId::Pitch | ChannelId::Yaw);
     match regime.relative_percent {
@@ -209,7 +211,7 @@ fn between(low: f64, high: f64, unit: &str) -> String {
     }
 }
 
-/// Samples and flights in words: "210 samples, both flights".
+/// Number of samples and flights in words: "210 samples, both flights".
 fn who(regime: &Regime, flights: usize) -> String {
     let seen = regime.flights.len();
     let who = match (seen, flights) {
@@ -227,7 +229,7 @@ fn plus_minus(value: f64, half: f64) -> String {
     if !(half.is_finite() && half > 0.0) {
         return significant(value, 3);
     }
-    // one significant figure of the uncertainty, two if the first figure is 1; at least a thousandth of the value
+    // the uncertainty has one significant figure, or two if the first is 1; it is at least a thousandth of the value
     let half = half.max(1e-3 * value.abs());
     let power = half.log10().floor();
     let power = if half / 10_f64.powf(power) < 2.0 { power - 1.0 } else { power };
@@ -235,7 +237,7 @@ fn plus_minus(value: f64, half: f64) -> String {
     format!("{value:.places$} ± {half:.places$}")
 }
 
-/// `x` to `figures` significant figures, without trailing zeros after the point.
+/// `x` with `figures` significant figures, without trailing zeros after the decimal point.
 fn significant(x: f64, figures: i32) -> String {
     if x == 0.0 || !x.is_finite() {
         return "0".into();

@@ -30,7 +30,8 @@ pub fn sentences(free_run: &[HorizonScore], channels: &[ChannelResult]) -> Vec<S
     diverges(free_run).into_iter().chain(stated).collect()
 }
 
-/// The part of a channel's effect that is due to its offset and to the variable that explains most, 1/s.
+/// The part of a channel's `effect_per_s` that is due to the mean residual and to the regime variable that explains most of
+/// the residual's variance, 1/s.
 fn weight(channel: &ChannelResult) -> f64 {
     let share = channel.bins.iter().map(|b| b.explained).fold(0.0, f64::max);
     let weight = channel.offset_share + (1.0 - channel.offset_share) * share;

@@ -29,7 +29,7 @@ pub enum DiagnoseError {
          elevator and throttle at two airspeeds"
     )]
     NoExcitation {
-        /// The unexcited variables with their values, in words.
+        /// The variables that hardly move, with the size of their motion, in words.
         what: String,
     },
     /// No channel's residual can be computed.
@@ -41,12 +41,12 @@ pub enum DiagnoseError {
         /// Name of the model.
         model: String,
     },
-    /// An effect to be tried or excluded is not in the catalogue.
+    /// An effect that is to be added to or excluded from the candidates is unknown.
     #[error(
         "cannot try or leave out effect {id:?}: it is unknown; `greylag effects list` names those there are"
     )]
     UnknownEffect {
-        /// The unknown identifier.
+        /// Identifier that is not known.
         id: String,
     },
     /// The progress listener cancelled the diagnosis.

@@ -1,11 +1,12 @@
 //! Delay of the recorded actuator positions relative to the gyros, estimated from the moments that the deflections cause.
 //!
 //! The kinematics do not depend on the actuators, but the angular accelerations do. Roll and pitch accelerations are
-//! regressed on rates, flow angles, inertial coupling, deflection and rate of deflection, all averaged over a short
-//! kernel. The averaging limits the noise of the derivatives. The delay is the coefficient of the rate of deflection divided
-//! by the coefficient of the deflection. This delay also contains any lag of the surfaces that the record does not show.
-//! Both sides are high-pass filtered at half a second: slower variations contain no information on a delay, but the errors of
-//! unmeasured flow angles, up to 0.2° with PX4.
+//! regressed on rates, flow angles, inertial coupling, deflection and rate of deflection, all averaged over a short kernel.
+//! The averaging limits the noise of the derivatives. The delay is the coefficient of the rate of deflection divided by the
+//! coefficient of the deflection. This delay also contains any lag of the surfaces that the record does not show.
+//!
+//! Accelerations and regressors are high-pass filtered at half a second. Slower variations contain no information on a
+//! delay. They contain the errors of unmeasured flow angles, which are up to 0.2° with PX4.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -22,15 +23,15 @@ const SLOW: usize = 7;
 /// Systematic error of the regression's delay, s: the largest error on 16 axes of noise-free flights of the X8 in calm
 /// air.
 const SYSTEMATIC: f64 = 2e-5;
-/// Additional standard deviation of the delay due to gusts, s for each m/s of the gusts' standard deviation.
+/// Additional standard deviation of the delay due to gusts, in s per m/s of the gusts' standard deviation.
 ///
 /// Gusts rotate the aircraft and the autopilot responds. The deflections are then correlated with moments that no regressor
 /// explains. On 20 flights of the X8 in light turbulence (2.4 m/s), the error was 2.2 ms RMS. The standard deviation without
 /// this addition was 1.1 ms.
 const BY_GUSTS: f64 = 8e-4;
-/// Standard deviation of the linearly extrapolated bias correction, as a share of the correction.
+/// Standard deviation of the linearly extrapolated bias correction, as a fraction of the correction.
 const CURVED: f64 = 0.5;
-/// Smallest number of windows for each regressor.
+/// Smallest number of windows per regressor for which a delay is estimated.
 const SUPPORT: usize = 10;
 
 /// A delay with its standard deviation, s.
@@ -38,14 +39,14 @@ const SUPPORT: usize = 10;
 pub struct Skew {
     /// Delay of the recorded deflections, s; positive if they are late.
     pub late: f64,
-    /// Standard deviation of the delay, s, with the prior's information.
+    /// Standard deviation of the delay, s.
     pub deviation: f64,
 }
 
-/// Delays estimated from roll alone and from pitch alone; `None` if the axis does not determine one.
+/// Delays estimated from roll alone and from pitch alone; `None` if the axis does not determine the delay.
 pub type ByAxis = [Option<Skew>; 2];
 
-/// Delays of the recorded deflections, estimated from roll alone and from pitch alone.
+/// Delays of the recorded deflections, estimated from roll alone and from pitch alone. `step` is the sampling interval, s.
 pub fn by_axis(segments: &[Segment], step: f64, sampling: Sampling) -> ByAxis {
     [
         from_axis(segments, step, sampling, |i| i.state.p, roll_terms),
@@ -53,12 +54,12 @@ pub fn by_axis(segments: &[Segment], step: f64, sampling: Sampling) -> ByAxis {
     ]
 }
 
-/// Delay of the recorded deflections from `own`, the delays by roll and pitch, together with the prior of ±1.5 samples,
-/// in gusts of level `gusts` (m/s).
+/// Combines `own`, the delays from roll and pitch, with the prior into one delay. The 95 % interval of the prior is ±1.5
+/// samples. `step` is the sampling interval (s), `gusts` the standard deviation of the gusts (m/s).
 ///
-/// Errors in the regressors bias the coefficients. `erring` holds the delays in copies of the flight with an additional
-/// error like its own: the additional bias in them is subtracted (simulation extrapolation, Cook and Stefanski 1994,
-/// linear).
+/// Errors in the regressors bias the coefficients. `erring` holds the delays estimated from copies of the flight. Each copy
+/// has additional errors of the same distribution as the errors of the flight. The change of the delay due to these errors
+/// is subtracted (simulation extrapolation, Cook and Stefanski 1994, linear).
 pub fn estimate(own: ByAxis, erring: &[ByAxis], step: f64, gusts: f64) -> Skew {
     let prior = (SKEW_SAMPLES * step).powi(-2);
     let (mut information, mut weighted) = (prior, 0.0);
@@ -87,19 +88,19 @@ fn extrapolated(skew: Skew, again: &[f64]) -> Skew {
     let mean = again.iter().sum::<f64>() / count;
     let scatter = again.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0);
     let pulled = mean - skew.late;
-    // variance of the draws' mean, and the part of the bias that is not linear in the errors' variance
+    // added variances: that of the mean over the copies, and that of the nonlinear part of the bias
     let deviation = (skew.deviation.powi(2) + scatter / count + (CURVED * pulled).powi(2)).sqrt();
     Skew { late: skew.late - pulled, deviation }
 }
 
-/// Regressors of the roll acceleration, the deflection last.
+/// Regressors of the roll acceleration. The last one is that of the deflection.
 fn roll_terms(i: &Instant) -> [f64; 7] {
     let (s, v) = (&i.state, i.state.airspeed);
     let v2 = v * v;
     [v2, v2 * s.beta, v * s.p, v * s.r, s.p * s.q, s.q * s.r, v2 * i.controls.aileron]
 }
 
-/// Regressors of the pitch acceleration, the deflection last.
+/// Regressors of the pitch acceleration. The last one is that of the deflection.
 fn pitch_terms(i: &Instant) -> [f64; 6] {
     let (s, v) = (&i.state, i.state.airspeed);
     let v2 = v * v;
@@ -140,7 +141,7 @@ fn from_axis<const T: usize>(
     regress(&rows, &values)
 }
 
-/// Regressors over the interval that starts at sample `k`.
+/// Mean regressors over the interval from sample `k` to the next sample.
 fn held<const T: usize>(
     instants: &[Instant],
     k: usize,
@@ -157,7 +158,7 @@ fn held<const T: usize>(
     }
 }
 
-/// Each row less the moving mean of `SLOW` rows.
+/// High-pass filter: each row less the moving mean of `SLOW` rows.
 fn fast(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let about = |i: usize| &rows[i.saturating_sub(SLOW / 2)..(i + SLOW / 2 + 1).min(rows.len())];
     let less_mean = |(i, row): (usize, &Vec<f64>)| {
@@ -168,7 +169,8 @@ fn fast(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     rows.iter().enumerate().map(less_mean).collect()
 }
 
-/// Kernel averages from sample `start`: the regressors with the rate of the last one, and the acceleration.
+/// Kernel averages over the window from sample `start` on. Returns the regressors followed by the rate of the last
+/// regressor, and the angular acceleration.
 fn window<const T: usize>(
     kernel: &[f64],
     terms: impl Fn(usize) -> [f64; T],

@@ -1,8 +1,8 @@
 //! Normal equations that are block-tridiagonal in time, bordered by constants.
 //!
-//! The right-hand side is the last column of the constants. Elimination turns this column into the solution. The last
-//! entry of the corner becomes the minimum of the sum of squares. A stretch is eliminated from both ends towards its middle
-//! in parallel, with the same number of operations as in sequence.
+//! The right-hand side is stored as the last column of the constants. Elimination replaces this column by the right-hand
+//! side of the constants' equations, and the last entry of the corner by the minimum of the sum of squares. A stretch is
+//! eliminated from both ends towards its middle in parallel, with the same number of operations as in sequence.
 
 /// Square block of one instant's unknowns.
 pub type Block<const N: usize> = [[f64; N]; N];
@@ -19,7 +19,7 @@ const WORTH_A_THREAD: usize = 2000;
 pub struct Node<const N: usize, const W: usize> {
     /// Block of the instant's unknowns.
     pub own: Block<N>,
-    /// Coupling with the constants.
+    /// Coupling with the constants, and the right-hand side.
     pub rest: Wide<N, W>,
 }
 
@@ -30,7 +30,7 @@ pub struct Link<const N: usize, const W: usize> {
     pub first: Node<N, W>,
     /// Contribution to the second instant.
     pub second: Node<N, W>,
-    /// Coupling: rows of the first, columns of the second instant.
+    /// Coupling of the two instants: rows of the first, columns of the second instant.
     pub coupling: Block<N>,
 }
 
@@ -47,19 +47,20 @@ impl<const N: usize, const W: usize> Node<N, W> {
 /// Equations of the constants after elimination.
 #[derive(Clone, Copy, Debug)]
 pub struct Left<const W: usize> {
-    /// Normal equations of the constants; the last entry is the sum of squares.
+    /// Normal equations of the constants. The last entry is the sum of squares, minimised over the eliminated unknowns.
     pub corner: Corner<W>,
     /// Logarithm of the determinant of the eliminated block.
     pub log_det: f64,
 }
 
 impl<const W: usize> Left<W> {
-    /// The neutral element of `add`.
+    /// Equations without any contribution.
     pub const ZERO: Self = Left { corner: [[0.0; W]; W], log_det: 0.0 };
 
     /// Subtracts the contribution of an eliminated instant from the upper triangle; `mirror` completes the lower one.
     fn take<const N: usize>(&mut self, done: &Eliminated<N, W>) {
-        // The corner takes most of the computing time and is symmetric: each row begins at its block of eight columns.
+        // The corner takes most of the computing time. It is symmetric, so the columns left of the row's own block of eight
+        // columns are skipped.
         for (i, sums) in self.corner.iter_mut().enumerate() {
             let from = i / 8 * 8;
             for row in &done.rest {
@@ -81,7 +82,7 @@ impl<const W: usize> Left<W> {
         }
     }
 
-    /// Adds the contribution of another part.
+    /// Adds the contribution of another part of a stretch, or of another stretch.
     pub fn add(&mut self, other: &Self) {
         add(&mut self.corner, &other.corner);
         self.log_det += other.log_det;
@@ -105,18 +106,18 @@ pub enum Keep {
     /// All eliminated instants, for the back substitution.
     Instants,
     /// The equations at every [`PART`]-th instant. The back substitution eliminates the instants between them again. An
-    /// instant with all constants takes 2.6 kB, an hour of flight a gigabyte.
+    /// instant with all constants takes 2.6 kB of memory, so an hour of flight would take a gigabyte.
     Parts,
 }
 
-/// Number of instants that the back substitution eliminates again at a time.
+/// Number of instants that the back substitution eliminates again in one go.
 const PART: usize = 512;
 
 /// Elimination of one side of a stretch, from its end towards the middle.
 #[derive(Clone, Debug)]
 struct Side<const N: usize, const W: usize> {
     done: Vec<Eliminated<N, W>>,
-    /// Contributions to every [`PART`]-th instant from those before it.
+    /// Contributions to every [`PART`]-th instant from the instants that were eliminated before it.
     parts: Vec<Node<N, W>>,
 }
 
@@ -270,7 +271,8 @@ impl Towards {
         }
     }
 
-    /// Eliminates the first `length` instants of a side.
+    /// Eliminates the first `length` instants of a side. Returns the side, the contributions to the next instant, and the
+    /// equations of the constants.
     fn side<const N: usize, const W: usize>(
         self,
         length: usize,
@@ -297,8 +299,8 @@ impl Towards {
         Some((side, pending, left))
     }
 
-    /// The unknowns of a side of `length` instants, in order from the middle outwards. `middle` holds those of the
-    /// middle.
+    /// The unknowns of a side of `length` instants, in order from the middle outwards. `middle` holds the unknowns of the
+    /// middle instant, `by` the negated constants followed by one.
     fn solve<const N: usize, const W: usize>(
         self,
         side: &Side<N, W>,
@@ -367,8 +369,8 @@ impl<const N: usize, const W: usize> Eliminated<N, W> {
 }
 
 impl<const N: usize, const W: usize> Stretch<N, W> {
-    /// The unknowns in order of time; `by` holds the negated constants, followed by one. `None` if the elimination
-    /// did not succeed, or if nothing was kept of it.
+    /// The unknowns in order of time. `by` holds the negated constants, followed by one. `None` if a repeated elimination
+    /// fails, or if the elimination kept only the constants.
     pub fn substitute(
         &self,
         equations: &impl Equations<N, W>,

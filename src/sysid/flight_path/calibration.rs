@@ -1,20 +1,21 @@
 //! Rare instrument errors: each error is estimated only if a flight shows it significantly.
 //!
 //! Rare errors are gains of gyros, accelerometers and vanes, an offset of airspeed or heading, and a delay of many samples.
-//! If all were free in every flight, the biases would be less certain in every flight. Each error is therefore held at its
-//! prior mean at first. It is freed if its estimate without its prior differs from the prior mean significantly and by a
-//! relevant size (a score test with the path and all other constants fitted; Klein and Morelli, Aircraft System
-//! Identification, section 5.3.3).
+//! If all of them were free, the biases would be less certain in every flight. Each error is therefore held at its prior
+//! mean at first. It is freed if the data contradict this value: its estimate without the prior differs from the prior mean
+//! significantly and by a relevant size. This is a score test with the path and all other constants fitted (Klein and
+//! Morelli, Aircraft System Identification, section 5.3.3).
 
 use crate::flight_path::equations::{Found, Problem};
 use crate::flight_path::nuisance::{
     self, AIRSPEED_OFFSET, COUNT, HEADING, SKEW_ATTITUDE, SKEW_FORCE, SKEW_VELOCITY,
 };
 
-/// Number of standard deviations for significance. It is high because fifteen errors are tested in every flight, and
-/// because the noise is not quite white.
+/// Number of standard deviations above which a difference is significant. It is large because fifteen errors are tested in
+/// every flight, and because the noise is not quite white.
 const BEYOND_DOUBT: f64 = 6.0;
-/// Smallest relevant errors of a gain (1), an airspeed (m/s) and a heading (rad).
+/// Smallest relevant error of a gain, dimensionless. `AIRSPEED` (m/s) and `ASKEW` (rad) are the smallest relevant offsets
+/// of airspeed and heading.
 const GAIN: f64 = 0.01;
 const AIRSPEED: f64 = 0.3;
 const ASKEW: f64 = 1.5 * std::f64::consts::PI / 180.0;
@@ -22,7 +23,7 @@ const ASKEW: f64 = 1.5 * std::f64::consts::PI / 180.0;
 const UNUSUAL: f64 = 4.0;
 /// Smallest relevant delay, s.
 const DELAY: f64 = 0.02;
-/// A constant is freed only if its standard deviation is below this share of its new prior standard deviation.
+/// A constant is freed only if its standard deviation is below this fraction of its new prior standard deviation.
 const KNOWN: f64 = 0.25;
 
 /// Index of the next constant to free, and its new prior standard deviation. `None` if no other constant is significant.

@@ -4,19 +4,19 @@ use std::ops::{Add, Mul, Sub};
 
 use greylag_num::statistics::quantile;
 
-/// Share of repeated values above which a channel's sensor is assumed to be slower than the log's rows.
+/// Fraction of repeated values above which a channel's sensor is assumed to be slower than the log's rows.
 const HELD_SHARE: f64 = 0.3;
 /// Number of periods of the slower sensor after which a repeated value counts as a new measurement.
 const LONGEST_PERIODS: f64 = 2.5;
 
-/// Kind of a channel's values, which determines interpolation.
+/// Kind of a channel's values. It determines the interpolation and the treatment of repeated values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolation {
     /// A real number, interpolated linearly.
     Linear,
     /// An angle that wraps at ±π, rad.
     Angle,
-    /// A command or a position, whose repeated values are measurements.
+    /// A command, a position or another quantity whose repeated values are all kept. It is interpolated linearly or held.
     Kept,
 }
 
@@ -25,7 +25,7 @@ pub enum Interpolation {
 pub struct Channel {
     time: Vec<f64>,
     value: Vec<f64>,
-    /// Whether all values are equal, if there are more than 20; always false for `Interpolation::Kept`.
+    /// Whether the channel has more than 20 values and all of them are equal. Always false for `Interpolation::Kept`.
     pub stuck: bool,
 }
 
@@ -89,7 +89,8 @@ impl Channel {
 
     /// The measurement at `t` (s); NaN without a sample within `near` (s).
     ///
-    /// The value is the interpolation of [`between`](Self::between). If the interpolation is NaN, it is the nearest sample.
+    /// The value is interpolated by [`between`](Self::between). If the interpolation is NaN, the value is the nearest
+    /// sample.
     pub fn measured(&self, t: f64, reach: f64, near: f64) -> f64 {
         let [left, right] = self.around(t);
         let distance = |s: &(f64, f64)| (s.0 - t).abs();
@@ -117,7 +118,8 @@ impl Channel {
     }
 }
 
-/// Marks the samples to keep if repeated values are dropped; `fresh` marks values that differ from the previous one.
+/// For each sample, whether it is kept when repeated values are dropped. `fresh` marks values that differ from the previous
+/// one.
 fn kept(time: &[f64], fresh: &[bool]) -> Vec<bool> {
     let new: Vec<f64> = time.iter().zip(fresh).filter(|(_, f)| **f).map(|(t, _)| *t).collect();
     let periods: Vec<f64> = new.windows(2).map(|w| w[1] - w[0]).collect();
@@ -151,8 +153,8 @@ pub fn wrap(angle: f64) -> f64 {
 /// `part`, 0 to 1, is the fraction of the interval. At the second and third sample, the cubic has the slope of the parabola
 /// through that sample and its two neighbours.
 ///
-/// Value and slope are continuous from one interval to the next. A parabola through the nearest sample would jump half-way
-/// between two samples. The search for a delay could not pass this jump if the samples are noisy.
+/// Value and slope are continuous from one interval to the next. A parabola through the nearest sample would be
+/// discontinuous half-way between two samples. With noisy samples, this jump would stop the search for a delay.
 pub fn cubic<T>([a, b, c, d]: [T; 4], part: f64) -> (T, T)
 where
     T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>,

@@ -1,4 +1,4 @@
-//! Normal equations of a fit: linearises all stretches at the present estimate, eliminates the paths, solves for the
+//! Normal equations of a fit: linearises all stretches at the present estimate, eliminates the paths, and solves for the
 //! constants.
 
 mod along;
@@ -20,7 +20,7 @@ use crate::flight_path::{Options, ReconstructError, noise};
 use greylag_logs::Sampling;
 use greylag_num::statistics;
 
-/// Number of columns if the constants are free: all constants and the right-hand side.
+/// Number of columns if the constants are free: one for each constant, and the right-hand side.
 const WIDTH: usize = COUNT + 1;
 const BETWEEN: usize = COUNT - INERTIAL + 1;
 
@@ -33,7 +33,7 @@ pub struct Found {
     pub values: Values,
     /// Standard deviations of the constants.
     pub deviations: Values,
-    /// Prior standard deviations of the constants, wider for those that were freed because the data shows them
+    /// Prior standard deviations of the constants. They are larger for constants that were freed because the data show them
     /// significantly.
     pub widths: Values,
     /// Noise levels of the sensors.
@@ -63,12 +63,13 @@ pub struct Solved<const N: usize> {
     constants: Values,
     /// Standard deviations of the constants; zero where they are held.
     pub deviations: Values,
-    /// Measurements predicted before the change.
+    /// Measurements less their predictions, before the change.
     pub readings: Vec<Vec<Reading>>,
 }
 
 impl Problem<'_> {
-    /// Solves for the path's motion and the constants, with gusts held.
+    /// Solves for the path's motion and the constants, with the gusts held. As in the other methods, residuals beyond
+    /// `bound` standard deviations are down-weighted.
     pub fn calm(&self, found: &Found, bound: f64) -> Option<Solved<MOTION>> {
         self.solve::<MOTION, WIDTH, AT, BETWEEN>(found, bound)
     }
@@ -78,8 +79,8 @@ impl Problem<'_> {
         self.solve::<MOTION_AND_GUST, 1, 1, 1>(found, bound)
     }
 
-    /// −2 ln L of the path and the constants at fixed noise levels, up to a constant: the merit function of the line
-    /// search.
+    /// The merit function of the line search: −2 ln L of the path and the constants at fixed noise levels, up to a
+    /// constant.
     pub fn merit(&self, found: &Found, bound: f64) -> f64 {
         let before = |i: usize| ((found.values[i] - self.means[i]) / self.widths[i]).powi(2);
         let pairs = self.log.tracks.par_iter().zip(&found.paths);
@@ -109,8 +110,8 @@ impl Problem<'_> {
 
     /// Robust scale of the residuals of the kinematic steps, for each axis of rotation and velocity.
     ///
-    /// The scales are relative to the assumed standard deviations of gyros and accelerometers. They are at most 1 if the assumed
-    /// noise is large enough.
+    /// The scales are relative to the assumed standard deviations of gyros and accelerometers. They are at most about 1 if
+    /// the assumed noise is large enough.
     pub fn step_residuals(&self, found: &Found) -> [f64; MOTION] {
         let (step, gravity) = (self.log.step, self.options.gravity);
         let sd = step_deviations::<MOTION>(&found.levels, step);
@@ -125,8 +126,8 @@ impl Problem<'_> {
         left.map(|mut left| noise::level(&mut left))
     }
 
-    /// Root mean square difference between measured and estimated roll, pitch and yaw, averaged over blocks of `block` (s), rad.
-    /// 0 for an angle that is not measured.
+    /// Differences between measured and estimated roll, pitch and yaw are averaged over blocks of `block` (s). Returns the
+    /// root mean square of these means, rad; 0 for an angle that is not measured.
     pub fn slow_disagreement(&self, found: &Found, block: f64) -> [f64; 3] {
         let vanes_at = self.log.sensors.vanes_at();
         let mut sums = [(0.0, 0.0); 3];
@@ -147,7 +148,7 @@ impl Problem<'_> {
         sums.map(|(sum, count): (f64, f64)| (sum / count.max(1.0)).sqrt())
     }
 
-    /// −2 ln L of the noise levels with the constants held, up to terms that do not depend on the gusts' level.
+    /// −2 ln L of the noise levels with the constants held. Terms that do not depend on the gusts' level are left out.
     pub fn misfit(&self, found: &Found, bound: f64) -> Option<f64> {
         let left = self.constants::<MOTION_AND_GUST, 1, 1, 1>(found, bound, None)?;
         let components = 3.0 * found.paths.iter().map(Path::len).sum::<usize>() as f64;
@@ -166,8 +167,8 @@ impl Problem<'_> {
         }))
     }
 
-    /// Estimate and standard deviation of each of the constants `places` without the prior of that constant. NaN if the data have
-    /// no information on the constant.
+    /// Estimate and standard deviation of each of the constants `places`, computed without the prior of that constant. NaN
+    /// if the data have no information on the constant.
     pub fn unbound(&self, found: &Found, bound: f64, places: &[usize]) -> Option<Vec<[f64; 2]>> {
         let left = self.constants::<MOTION, WIDTH, AT, BETWEEN>(found, bound, None)?;
         let bound = self.information(&left)?;
@@ -185,7 +186,7 @@ impl Problem<'_> {
         Some(places.iter().map(of).collect())
     }
 
-    /// Gradient of prior and data with respect to the constants.
+    /// Right-hand side of the equations of the constants: gradient of the log-likelihood of data and prior.
     fn pull<const W: usize>(&self, found: &Found, left: &Left<W>) -> SVector<f64, COUNT> {
         SVector::<f64, COUNT>::from_fn(|i, _| {
             let data =
@@ -241,7 +242,7 @@ impl Problem<'_> {
             let others = others.and_then(|o| o.get(i)).map(Vec::as_slice);
             let along = Along::<N, M, D>::new(self, track, path, found, bound, others);
             let (stretch, left) = band::eliminate::<N, W>(&along, keep)?;
-            // without a back substitution, only the equations of the constants are needed
+            // without a back substitution, only the equations of the constants are needed afterwards
             Some((Some((along, stretch)).filter(|_| keep != Keep::Constants), left))
         };
         let done: Vec<_> = pairs.map(one).collect::<Option<_>>()?;

@@ -1,8 +1,8 @@
-//! Uncertainty of the constants due to gusts of the estimated level, by simulation.
+//! Uncertainty of the constants due to gusts, by simulation.
 //!
 //! The fit of the constants assumes white noise of the air-data sensors with a variance that includes the gusts. But gusts
 //! are correlated over many seconds. White noise therefore understates the error of the mean wind and overstates that of a
-//! delay. Here, random gusts pass through the equations of the fit.
+//! delay. Here, random gusts of the estimated level are inserted into the equations of the fit.
 
 use nalgebra::{Matrix3, Vector3};
 use rand_distr::{Distribution, StandardNormal};
@@ -14,13 +14,14 @@ use crate::flight_path::nuisance::{COUNT, Values};
 use crate::flight_path::path::Path;
 use greylag_num::stream::{Stream, stream};
 
-/// Number of pairs of random draws in one set of equations. A pair is a draw without gusts and a draw with gusts.
+/// Number of pairs of random draws for which one set of equations is solved. A pair is a draw without gusts and a draw with
+/// gusts.
 const PAIRS: usize = OTHERS / 2;
-/// Number of sets of equations: their 32 pairs determine a standard deviation to one eighth of its value.
+/// Number of sets of equations. Their 32 pairs determine a standard deviation to one eighth of its value.
 const SETS: u64 = 4;
 
-/// Standard deviations of the constants of the fit `found`, which assumes no gusts, if the noise is that of `rough`. The
-/// noise of `rough` consists of gusts and of white noise of the air-data sensors.
+/// Standard deviations of the constants in `found`, a fit that assumes no gusts, for data with the noise levels of `rough`.
+/// The noise of `rough` consists of gusts and of white noise of the air-data sensors.
 pub fn deviations(problem: &Problem, found: &Found, rough: &Found, bound: f64) -> Option<Values> {
     let (mut assumed, mut drawn) = ([0.0; COUNT], [0.0; COUNT]);
     for set in 0..SETS {
@@ -45,8 +46,8 @@ pub fn deviations(problem: &Problem, found: &Found, rough: &Found, bound: f64) -
     }))
 }
 
-/// Random residuals of airspeed, α and β along a path. The first half has the noise that the fit assumes. The second half
-/// has white noise and gusts, from the same random numbers.
+/// Random residuals of airspeed, α and β along a path. The first half of the draws has the noise that the fit assumes. The
+/// second half has white noise and gusts, from the same random numbers.
 fn draws(
     problem: &Problem,
     path: &Path,

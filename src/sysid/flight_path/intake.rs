@@ -13,10 +13,11 @@ use greylag_physics::{Command, Controls, Sensors};
 use stretches::{gap, step, stretches};
 use track::track;
 
-/// Smallest number of samples with which a sensor is used in a stretch.
+/// Smallest number of samples of attitude and airspeed in a stretch that is used.
 const FEWEST: usize = 10;
 
-/// Largest number of stretches that are left out with a note of their own. A log with many gaps has thousands.
+/// Largest number of left-out stretches that have a note of their own. A log with many gaps can have thousands of
+/// stretches.
 const NAMED: usize = 8;
 
 /// Note on a log without vanes.
@@ -38,7 +39,7 @@ pub struct Log {
     pub rudder: Option<RudderMotion>,
     /// Errors and noise of the sensors, and the wind, as stated in the options or the log.
     pub sensors: Sensors,
-    /// Notes for the reader.
+    /// Notes on the log for the user, in sentences.
     pub notes: Vec<String>,
 }
 
@@ -72,7 +73,7 @@ pub struct Periods {
     pub velocity: f64,
 }
 
-/// Extent in time of a flight, over all stretches.
+/// Extent in time of a flight, from its first to its last stretch.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Span {
     /// Middle of the flight on the log's clock, s.

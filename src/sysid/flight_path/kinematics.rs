@@ -49,8 +49,8 @@ pub struct Step<const N: usize, const D: usize> {
     pub first: Block<N>,
     /// Derivatives with respect to the second sample.
     pub second: Block<N>,
-    /// Derivatives with respect to the constants that act between samples, and the negated difference in the last column. These
-    /// are the last `D` columns of the equations.
+    /// Derivatives with respect to the constants that act between samples, and the negated difference in the last column.
+    /// These columns are the last `D` columns of the equations.
     pub rest: Wide<N, D>,
 }
 
@@ -181,7 +181,7 @@ fn weight(track: &Track, k: usize, gravity: f64) -> Vector3<f64> {
     r.transpose() * Vector3::new(0.0, 0.0, -gravity)
 }
 
-/// `samples` with a delay of `late` sampling intervals removed, and the derivative of each with respect to the delay, per
+/// `samples` with a delay of `late` sampling intervals removed, and their derivatives with respect to the delay, per
 /// sampling interval. The interpolation is cubic through four samples.
 pub fn shifted(samples: &[[f64; 3]], late: f64) -> (Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
     let last = samples.len() as isize - 1;

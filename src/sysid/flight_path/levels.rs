@@ -1,4 +1,4 @@
-//! Noise levels of the sensors: estimated first from the measurements alone, then from the residuals of the fit.
+//! Noise levels of the sensors. They are estimated first from the measurements alone, then from the residuals of the fit.
 
 use crate::flight_path::intake::{Log, Track};
 use crate::flight_path::measurement::{self, Reading};
@@ -6,12 +6,13 @@ use crate::flight_path::noise;
 use crate::flight_path::path::CHANNELS;
 use greylag_physics::sensors::Noisy;
 
-/// Smallest noise levels of gyros (rad/s) and accelerometers (m/s²), of the size of the errors of the discrete kinematics.
+/// Smallest noise levels of gyros (rad/s) and accelerometers (m/s²). They are about as large as the errors of the discrete
+/// kinematics.
 const GYRO_FLOOR: f64 = 2e-4;
 const FORCE_FLOOR: f64 = 5e-3;
 /// Smallest noise levels of the measured channels: attitude (rad), airspeed (m/s), vanes (rad), velocity (m/s).
 const FLOORS: [f64; CHANNELS] = [2e-5, 2e-5, 2e-5, 1e-3, 5e-5, 5e-5, 1e-3, 1e-3, 1e-3];
-/// Smallest noise level of a channel, relative to the change of the path between two samples due to noise of gyros or
+/// Smallest noise level of a channel, divided by the change of the path between two samples due to the noise of gyros or
 /// accelerometers.
 ///
 /// With a smaller level the path would follow every single measurement. The most likely delay would then be half a sample
@@ -20,11 +21,12 @@ const CARRIED: f64 = 30.0;
 /// Noise levels used if there are too few samples for an estimate: attitude (rad), airspeed (m/s), vanes (rad), velocity
 /// (m/s).
 const DEFAULTS: [f64; CHANNELS] = [0.02, 0.02, 0.05, 0.5, 0.02, 0.02, 0.5, 0.5, 0.5];
-/// Largest noise levels times colour: the largest plausible errors of attitude (rad), airspeed (m/s), vanes (rad) and
-/// velocity (m/s). Without this limit, a path that departs from a sensor would reduce the sensor's weight and depart further.
+/// Largest products of noise level and `colour`: the largest plausible errors of attitude (rad), airspeed (m/s), vanes
+/// (rad) and velocity (m/s). Without this limit, a path that departs from a sensor would reduce the sensor's weight and
+/// depart further.
 const WIDEST: [f64; CHANNELS] = [0.05, 0.05, 0.1, 2.0, 0.1, 0.1, 1.0, 1.0, 1.0];
-/// Scaled residual of the kinematic steps above which the noise levels of gyros or accelerometers are raised. The scaled
-/// residual of a launch is 8.
+/// Noise levels of gyros or accelerometers are raised if the scaled residual of the kinematic steps exceeds this. At a
+/// launch, the scaled residual is 8.
 const EXCESSIVE: f64 = 2.0;
 /// Standard deviation of the specific force if the log has no accelerometers, m/s².
 const UNKNOWN_FORCE: f64 = 3.0;
@@ -52,15 +54,15 @@ pub struct Levels {
     pub gusts: f64,
     /// Noise of the measured channels, in their units.
     pub measured: [f64; CHANNELS],
-    /// Smallest levels of the channels: the white part of the measurements, if the sampling rate is high enough to estimate it.
-    /// Without this limit, a path that follows the measurements closely would have residuals below the noise.
+    /// Smallest levels of the channels: the white part of the measurements, if the sampling rate is high enough to estimate
+    /// it. Without this limit, residuals of a path that follows the measurements closely would seem smaller than the noise.
     pub white: [f64; CHANNELS],
     /// Ratio of the standard deviation of the channels' block means to that of white noise, at least 1.
     pub colour: [f64; CHANNELS],
     /// Whether a level is stated and therefore not estimated.
     pub stated: [bool; CHANNELS],
-    /// White noise of the airspeed whose means have the same standard deviation as the slow error of the sensor, m/s. Zero if a
-    /// vane measures α or the log has no velocity over ground.
+    /// Standard deviation of white airspeed noise whose time averages vary as much as the slow error of the sensor, m/s.
+    /// Zero if a vane measures α or the log has no velocity over ground.
     ///
     /// In all other logs, the mean vertical wind and α follow from the change of airspeed with climb. In 13 minutes of a PX4
     /// flight without wind, a slow error of 0.01 m/s was estimated as 0.18 ± 0.04 m/s of vertical wind.
@@ -99,7 +101,7 @@ impl Levels {
         let speeds = log.tracks.iter().flat_map(|t| &t.airspeed).filter(|v| v.is_finite());
         let (sum, count) = speeds.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
         let between = |sd: [f64; 3]| CARRIED * log.step * sd.into_iter().fold(0.0, f64::max);
-        // the unknown force of a log without accelerometers is not noise: its mean is not zero
+        // the unknown force in a log without accelerometers is not noise, because its mean is not zero
         let gain = if log.has.force { between(force) } else { 0.0 };
         let turn = between(gyro);
         let floor: [f64; CHANNELS] = std::array::from_fn(|i| {
@@ -156,8 +158,8 @@ impl Levels {
         1.0_f64.hypot(least / level)
     }
 
-    /// Estimates the levels again from the residuals of every stretch with the sampling interval `step` (s). Returns the largest
-    /// change of the natural logarithm of a level.
+    /// Estimates the levels again from the residuals in `readings`, for the sampling interval `step` (s). Returns the
+    /// largest change of the natural logarithm of a level.
     pub fn renew(&mut self, readings: &[Vec<Reading>], step: f64) -> f64 {
         let mut change = 0.0_f64;
         for (channel, widest) in WIDEST.into_iter().enumerate() {

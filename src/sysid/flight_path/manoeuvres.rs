@@ -2,9 +2,9 @@
 //!
 //! Root mean squares over the second around a sample are compared with bounds. A sample belongs to a roll manoeuvre if the
 //! roll rate, or the aileron about its mean, exceeds its bound. A sample belongs to a pitch manoeuvre if the rate of the
-//! pitch angle, or the elevator about its mean, exceeds its bound. The other samples belong to a change of thrust if the
-//! throttle moves, to a turn if the bank angle is large, and to steady flight if neither holds. Manoeuvres shorter than
-//! half a second join the preceding one.
+//! pitch angle, or the elevator about its mean, exceeds its bound. Any other sample belongs to a change of thrust if the
+//! throttle moves, or else to a turn if the bank angle is large, or else to steady flight. Manoeuvres shorter than half a
+//! second join the preceding one.
 
 use crate::flight_path::reconstruction::{Instant, Reconstruction, Segment};
 

@@ -15,11 +15,11 @@ use crate::flight_path::nuisance::{
 use crate::flight_path::path::{CHANNELS, Path, SLOW, flow_angles};
 use crate::flight_path::rotation::{cross, euler_by_turn, to_euler};
 
-/// Number of columns of the constants that act at instants and of the right-hand side.
+/// Number of columns for the constants that act at instants and for the right-hand side.
 pub const AT: usize = INERTIAL + 1;
 /// Number of additional right-hand sides for which the equations are solved at once.
 pub const OTHERS: usize = 16;
-/// Residuals of a channel for the additional right-hand sides.
+/// Residuals of a channel, one for each additional right-hand side.
 pub type Others = [f64; OTHERS];
 
 /// Measurements of an instant less their predictions.
@@ -27,7 +27,7 @@ pub type Others = [f64; OTHERS];
 pub struct Reading {
     /// Measured less predicted, by channel, rad or m/s; NaN without a measurement.
     pub residual: [f64; CHANNELS],
-    /// Derivatives of the predictions with respect to the delay of the channel, rad/s or m/s².
+    /// Derivatives of the predictions with respect to the delay of each channel, rad/s or m/s².
     by_late: [f64; CHANNELS],
 }
 
@@ -91,7 +91,7 @@ fn scale(slopes: &mut Matrix3<f64>, values: &Values) {
     }
 }
 
-/// Derivatives of measured airspeed, α and β with respect to a gust at sample `k`, earth axes.
+/// Derivatives of measured airspeed, α and β with respect to a gust at sample `k`, earth axes. `None` at low airspeed.
 pub fn by_gust(path: &Path, k: usize, values: &Values) -> Option<Matrix3<f64>> {
     let mut slopes = air_slopes(&path.air_velocity(k))?;
     scale(&mut slopes, values);
@@ -168,8 +168,8 @@ fn with_errors(channel: usize, h: f64, values: &Values) -> (f64, f64) {
 /// Adds the reading of sample `k` to the equations.
 ///
 /// `spread` holds the standard deviations of the channels. A residual beyond `bound` standard deviations is down-weighted.
-/// The first columns are `others`, additional residuals of the air-data sensors. The constants that act at instants follow.
-/// There are none if `M` is 1.
+/// The first columns are `others`, additional residuals of the air-data sensors. The columns of the constants that act at
+/// instants follow. With `M` = 1 the constants are held and have no columns.
 #[expect(clippy::too_many_arguments, reason = "one call site; a struct would only rename them")]
 pub fn add<const N: usize, const W: usize, const M: usize>(
     path: &Path,
@@ -214,14 +214,14 @@ pub fn add<const N: usize, const W: usize, const M: usize>(
     }
 }
 
-/// Adds `part` to `row`: the leading columns to the leading columns, the last column to the last column.
+/// Adds `part` to `row`: the last column to the last column, the other columns to the first columns.
 fn spill<const M: usize, const W: usize>(row: &mut [f64; W], part: &[f64; M]) {
     row.iter_mut().zip(&part[..M - 1]).for_each(|(x, y)| *x += y);
     row[W - 1] += part[M - 1];
 }
 
-/// Derivatives of every channel with respect to the path at sample `k` and to the constants. `None` for a singular
-/// channel: Euler angles near vertical pitch, air data at low airspeed.
+/// Derivatives of every channel with respect to the path at sample `k` and to the constants. `None` for a singular channel:
+/// Euler angles near vertical pitch, or air data at low airspeed.
 fn slopes<const N: usize, const M: usize>(
     path: &Path,
     k: usize,

@@ -43,8 +43,8 @@ use greylag_physics::airframe::ActuatorFigures;
 /// Clock of the reconstructed deflections.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ActuatorClock {
-    /// The gyros' clock: recorded deflections are shifted if their delay is significant. The estimated delay contains any time
-    /// delay or lag of the surfaces that the record does not show. The shift removes this delay as well.
+    /// The gyros' clock: recorded deflections are shifted if their delay is significant. The estimated delay also contains
+    /// any time delay or lag of the surfaces that the record does not show. The shift removes both.
     Estimated,
     /// The log's clock: deflections stay as recorded. A later search for missing effects can then separate clock errors from
     /// physics. `skew_actuators` is estimated for information only.
@@ -60,8 +60,9 @@ pub struct Options {
     pub actuators: ActuatorFigures,
     /// Effective gravity at the site, m/s².
     pub gravity: f64,
-    /// Meaning of a rate sample: an instant's value, or a value held until the next sample. `None` to read the meaning from the
-    /// log's column `rate_hold_s`, or to infer it from the data. Clock skews are relative to the gyro samples of this meaning.
+    /// Meaning of a sample of the body rates: the value at an instant, or a value held until the next sample. `None` to
+    /// read the meaning from the log's column `rate_hold_s`, or to infer it from the data. Clock skews are relative to the
+    /// gyro samples under this meaning.
     pub sampling: Option<Sampling>,
     /// Clock of the reconstructed deflections.
     pub actuators_clock: ActuatorClock,
@@ -110,7 +111,7 @@ impl Options {
         }
     }
 
-    /// These options with the shortest segment reduced to `shortest_s` (s), if that is less.
+    /// These options with the shortest segment reduced to `shortest_s` (s) if it is longer.
     pub fn down_to(self, shortest_s: f64) -> Options {
         Options { shortest_s: self.shortest_s.min(shortest_s), ..self }
     }
@@ -169,8 +170,8 @@ pub enum ReconstructError {
     },
 }
 
-/// Reconstructs `flight`: resamples each segment to one uniform clock, estimates and removes sensor errors and wind.
-/// A flight that is passed by value is dropped after the resampling, to free its memory.
+/// Reconstructs `flight`: resamples each segment to uniform time steps, and estimates and removes sensor errors and wind. A
+/// flight that is passed by value is dropped after the resampling, to free its memory.
 ///
 /// # Errors
 /// A required channel is missing, the log contains no flight or no stretch of it is long enough, or its sensors

@@ -39,8 +39,8 @@ pub const FORCE: usize = 17;
 pub const SKEW_FORCE: usize = 20;
 /// First index of the drift rates of the gyro biases p, q, r, rad/s².
 ///
-/// The gyros of ArduPilot's SITL drift by 0.05°/s a minute, like a gyro that warms up. With constant biases, the heading
-/// error was 1.5° in four minutes.
+/// The gyro biases of ArduPilot's SITL drift by 0.05°/s per minute, like those of a gyro that warms up. With constant
+/// biases, the heading error was 1.5° after four minutes.
 pub const DRIFT: usize = 21;
 /// First index of the gains of the gyros p, q, r less 1.
 pub const GYRO_GAIN: usize = 24;
@@ -87,11 +87,11 @@ pub const NAMES: [(&str, &str); COUNT] = {
 /// sensor's filter is assumed to be about as long as its period.
 const SKEW_PERIODS: f64 = 0.5;
 
-/// Prior standard deviation of the drift rate of a gyro's bias, rad/s²: somewhat more than in ArduPilot's SITL (0.05°/s a
-/// minute, 1.45e-5 rad/s²).
+/// Prior standard deviation of the drift rate of a gyro's bias, rad/s². It is slightly larger than the drift rate of
+/// ArduPilot's SITL (0.05°/s per minute, 1.45e-5 rad/s²).
 const DRIFTING: f64 = 2e-5;
-/// Time over which a drift rate changes by about its magnitude, s. Of 300 s and 3000 s, 3000 s gave better results on
-/// ArduPlane's logs: a drift rate that changes faster follows their slow heading errors.
+/// Time over which a drift rate changes by about its magnitude, s. On ArduPlane's logs, 3000 s gave better results than 300
+/// s: a drift rate that changes faster follows slow heading errors of these logs.
 const STEADY: f64 = 3000.0;
 
 impl Span {
@@ -101,8 +101,8 @@ impl Span {
     }
 }
 
-/// Prior standard deviation of a constant that is known exactly, relative to its usual prior standard deviation. A value
-/// above zero keeps the equations regular.
+/// Prior standard deviation of a constant that is held or known exactly, relative to its usual prior standard deviation. A
+/// value above zero keeps the equations regular.
 const HELD: f64 = 1e-4;
 
 /// Rare instrument errors with their prior standard deviations. They are held at zero until a flight shows them
@@ -119,7 +119,7 @@ const SELDOM: [(usize, f64); 10] = [
     (FORCE_GAIN + 1, 0.1),
     (FORCE_GAIN + 2, 0.1),
 ];
-/// Prior standard deviation of a delay that exceeds its usual width, s.
+/// Prior standard deviation of a delay that a flight has shown to be unusually long, s.
 const LATE: f64 = 0.5;
 
 /// Prior standard deviation of a constant that a flight has shown significantly. `None` for a constant that is always free.
@@ -133,7 +133,7 @@ pub fn held(place: usize, width: f64) -> bool {
     SELDOM.iter().any(|(of, wide)| *of == place && width <= 2.0 * HELD * wide)
 }
 
-/// Prior standard deviations of the constants for `log`: stated for the sensors, or else the default values.
+/// Prior standard deviations of the constants for `log`: as stated for the sensors, or else default values.
 pub fn prior_widths(log: &Log) -> Values {
     let mut widths = usual_widths(log);
     for (place, (width, (name, _))) in widths.iter_mut().zip(NAMES).enumerate() {
@@ -174,7 +174,7 @@ fn usual_widths(log: &Log) -> Values {
     width
 }
 
-/// Prior means of the constants: stated for the sensors of `log`, or else zero.
+/// Prior means of the constants: as stated for the sensors of `log`, or else zero.
 ///
 /// The Earth's rate to the north has the mean 5.8e-5 rad/s. Mean and standard deviations of the Earth's rate (7.29e-5 rad/s)
 /// cover latitudes from −65° to 65°.
@@ -197,7 +197,7 @@ pub fn gyro_bias_of(axis: usize, time: f64, span: &Span) -> [(usize, f64); 2 + K
         1 => (DRIFT + axis, since_middle),
         _ => {
             let knot = (i - 2) as f64 - 0.5 * (KNOTS - 1) as f64;
-            // from the middle to both ends: the bias in the middle does not change
+            // a change acts from its knot towards the nearer end of the flight: the bias in the middle does not change
             let beyond = match knot {
                 ..0.0 => (since_middle - knot * span.apart()).min(0.0),
                 _ => (since_middle - knot * span.apart()).max(0.0),
@@ -242,9 +242,9 @@ pub fn concerned(place: usize, has: &Present) -> bool {
 
 /// Whether a constant is unobservable in the log.
 ///
-/// Without accelerometers and velocity over ground, the air-data sensors are not related to one another. Only the smoothness
-/// of the path then determines the constants, and this favours slow flight: in a flight without sensor errors, the estimate
-/// of the airspeed scale was four.
+/// Without accelerometers and velocity over ground, the air-data sensors are not related to one another. Only the
+/// smoothness of the path then determines the constants, and a slow flight is smoother. In a flight without sensor errors,
+/// the airspeed scale was estimated as four.
 pub fn unseeable(place: usize, has: &Present) -> bool {
     let of_the_air = place < SKEW_ATTITUDE
         || place == SKEW_AIRSPEED

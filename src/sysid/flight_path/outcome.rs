@@ -1,4 +1,5 @@
-//! Conversion of the smoother's result to a reconstruction: states, sensor errors, remaining errors, actuator delay, notes.
+//! Conversion of the smoother's result to a reconstruction: states, sensor errors, remaining errors, actuator delay and
+//! notes.
 
 use nalgebra::Vector3;
 
@@ -19,7 +20,8 @@ use greylag_num::stream::stream;
 use greylag_physics::sensors::Known;
 use greylag_physics::{Controls, State};
 
-/// A constant counts as unobservable if its posterior standard deviation exceeds this share of its prior standard deviation.
+/// A constant counts as unobservable if its posterior standard deviation exceeds this fraction of its prior standard
+/// deviation.
 const UNSEEN: f64 = 0.7;
 /// Distance of an estimate from its prior mean, in prior standard deviations, above which a note is written.
 const FAR: f64 = 3.0;
@@ -28,20 +30,20 @@ const ROUGH: f64 = 0.1;
 /// Smallest actuator delay that is corrected, in sampling intervals. A smaller delay is within the error of the regression.
 const CORRECTED: f64 = 0.25;
 
-/// Length of the blocks over which the difference between estimated and measured attitude is averaged, s. The means do not
-/// count as noise.
+/// Length of the blocks over which the difference between estimated and measured attitude is averaged, s. The means count
+/// as a systematic error, not as noise.
 const DISAGREEING: f64 = 4.0;
 
 /// Standard deviations of the constant errors of a flight controller's pitch and heading, rad.
 ///
 /// A log does not show these errors: an estimator that attributes an accelerometer bias to pitch corrects the accelerations
-/// consistently. PX4 in SITL has 0.14° to 0.22° in pitch, 0.11° to 0.30° in heading
-/// (results/notes/2026-11-27-flight-path-reconstruction.md). For a board levelled and a compass calibrated by hand, at least
-/// the same errors are assumed.
+/// consistently. PX4 in SITL has errors of 0.14° to 0.22° in pitch and 0.11° to 0.30° in heading
+/// (results/notes/2026-11-27-flight-path-reconstruction.md). A real board levelled by hand and a compass calibrated by hand
+/// are assumed to have at least these errors.
 const ALIGNED: [f64; 2] = [0.25 * DEGREE, 0.5 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// Number of random draws of the path's errors: they determine the RMS errors over a flight to a few percent.
+/// Number of random draws of the path's errors. They determine the RMS errors over a flight to a few percent.
 const DRAWS: usize = 3;
 
 /// Assembles the reconstruction.
@@ -107,8 +109,8 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     })
 }
 
-/// Simulates the error of the path in copies of the flight. Returns the root mean square error of each state, with the
-/// gyros' noise for the rates, and the actuator delays estimated from each copy.
+/// Simulates the error of the path in copies of the flight. Returns the root mean square error of each state, and the
+/// actuator delays estimated from each copy. The errors of the body rates are the noise levels of the gyros.
 fn draws(
     problem: &Problem,
     found: &Found,
@@ -255,13 +257,13 @@ fn nuisances(problem: &Problem, smoothed: &Found) -> Vec<Nuisance> {
         .collect()
 }
 
-/// Standard deviations of α and β without vanes, rad, as nuisances with the value zero.
+/// Standard deviations of α and β without vanes, rad, as nuisances with the value zero. No entry for an angle with a vane.
 ///
-/// The variance has four parts: the wind, the path, the slow difference between estimated and measured pitch and heading, and
-/// the constant error of the measured pitch and heading.
+/// The variance has four parts: the uncertainty of the wind, the uncertainty of the path, the slow difference between
+/// estimated and measured pitch and heading, and the constant error of the measured pitch and heading.
 ///
-/// If gyros and compass differ by a degree over half a minute, the heading has an error of at least this size, even with
-/// little noise. The standard deviation of β includes this error.
+/// Noise alone does not represent these errors. If gyros and compass differ by a degree over half a minute, the heading has
+/// an error of at least this size. The standard deviation of β includes this error.
 fn unmeasured_angles(
     problem: &Problem,
     smoothed: &Found,

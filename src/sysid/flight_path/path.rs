@@ -69,8 +69,8 @@ impl Path {
         path
     }
 
-    /// Differences between the measured velocities over ground of `track` and the path's velocities, m/s: sum and number. Their
-    /// mean is the wind if the path has none.
+    /// Sum and number of the differences between the measured velocities over ground of `track` and the path's velocities,
+    /// m/s. If the path has no wind, the mean difference is an estimate of the wind.
     pub fn wind_left(&self, track: &Track) -> (Vector3<f64>, f64) {
         let mut sum = (Vector3::zeros(), 0.0);
         for (measured, own) in track.velocity.iter().zip(&self.velocity) {

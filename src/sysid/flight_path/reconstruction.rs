@@ -36,8 +36,8 @@ pub struct Segment {
 
 /// A sensor error or a component of the wind that the reconstruction has estimated.
 ///
-/// The wind is the steady part without gusts. Its standard deviation covers the difference to the mean wind of the flight.
-/// The velocity relative to the air at an instant includes the gust.
+/// The wind is the steady part, without gusts. Its standard deviation includes the difference from the mean wind of the
+/// flight. The velocity relative to the air at an instant includes the gust.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Nuisance {
     /// Name, for example `gyro_bias_p`, `alpha_bias`, `airspeed_scale`, `wind_north`.

@@ -17,9 +17,9 @@ use greylag_logs::Sampling;
 
 /// Smallest number of clock skews that must agree.
 const FEWEST: usize = 2;
-/// A clock skew counts as well determined if its standard deviation is below this share of the sample period.
+/// A clock skew counts as well determined if its standard deviation is below this fraction of the sample period.
 const KNOWN: f64 = 0.1;
-/// Tolerance for the clock skews of a simulator, as a share of the sample period: their largest differences due to
+/// Tolerance for the clock skews of a simulator, as a fraction of the sample period. It covers the differences due to
 /// interpolation errors.
 const AGREE: f64 = 0.03;
 /// Additional tolerance, in standard deviations of the clock skew.

@@ -1,9 +1,9 @@
 //! The smoother: fits path and constants to all sensors by Gauss–Newton iterations.
 //!
-//! First, motion and constants are fitted; gusts count as noise of the air-data sensors. If gusts are more likely than
-//! noise, gusts along the path are then estimated with the constants held. The standard deviations of the constants are
-//! raised by the effect of these gusts. A joint estimate of path, gusts and constants would give an airspeed scale far above
-//! 1, because a large scale makes every gust smaller.
+//! First, motion and constants are fitted; gusts count as noise of the air-data sensors. If the data make gusts more likely
+//! than white noise, gusts along the path are then estimated with the constants held. The standard deviations of the
+//! constants are raised by the effect of these gusts. A joint estimate of path, gusts and constants would give an airspeed
+//! scale far above 1, because a large scale makes every gust smaller.
 
 use nalgebra::Vector3;
 
@@ -16,18 +16,19 @@ use crate::flight_path::levels::{CALM, Levels};
 use crate::flight_path::nuisance::WIND;
 use crate::flight_path::path::Path;
 
-/// Standard deviations of the gusts that are tried first, m/s, and factors of the refinement around the best of them.
+/// Standard deviations of the gusts that are tried first, m/s. `FINE` holds the factors of the refinement around the best
+/// of them.
 const COARSE: [f64; 4] = [0.02, 0.1, 0.5, 2.0];
 const FINE: [f64; 3] = [2.0, 1.4, 1.2];
 /// Residuals beyond this number of standard deviations are down-weighted.
 const BOUND: f64 = 4.0;
 /// Number of iterations with gusts.
 const GUSTY: usize = 4;
-/// Number of iterations before noise levels are estimated from residuals, and largest total number of iterations.
+/// Number of iterations before noise levels are estimated from residuals. `LAST` is the largest total number of iterations.
 const FIRST: usize = 2;
 const LAST: usize = 25;
-/// Convergence tolerances: largest change of a constant in its standard deviations, and largest relative change of a noise
-/// level.
+/// Convergence tolerance: largest change of a constant, in its standard deviations. `LEVEL_TOLERANCE` is the largest change
+/// of the natural logarithm of a noise level.
 const STEP_TOLERANCE: f64 = 0.05;
 const LEVEL_TOLERANCE: f64 = 0.02;
 /// Smallest fraction of a step that the line search tries.
@@ -59,7 +60,7 @@ pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
     Ok(found)
 }
 
-/// Fits motion and constants without gusts, starting with the iteration number `from`.
+/// Fits motion and constants without gusts. The iterations are numbered from `from`.
 fn calm(problem: &Problem, found: &mut Found, from: usize) -> Result<(), ReconstructError> {
     let Problem { log, options, .. } = *problem;
     let singular = || no_path(&options.name, "the equations became singular");
@@ -111,7 +112,7 @@ fn gusty(
     found: &mut Found,
     singular: &dyn Fn() -> ReconstructError,
 ) -> Result<(), ReconstructError> {
-    // if a vane is missing, the filter and the delay of the airspeed would be estimated as vertical gusts
+    // if a vane is missing, a filter or a delay of the airspeed would be estimated as vertical gusts
     if !(problem.log.has.alpha && problem.log.has.beta) {
         return Ok(());
     }

@@ -1,11 +1,12 @@
 //! Misalignment of the measured axes: a small constant rotation relative to the body axes.
 //!
 //! ε (rad, body axes) is the rotation from the body axes to the axes of the board or the markers. The coordinates of a
-//! vector x in the rotated axes are x − ε × x = x + x × ε to first order (Stevens, Lewis and Johnson, Aircraft
-//! Control and Simulation, section 1.3). This formula applies to body rates, specific force and the velocity relative to the
-//! air. The path is smoothed in the axes of gyros and attitude. Without vanes, α and β also refer to these axes. Vanes
-//! measure in the body axes: the reconstruction then attributes the mean effect of the misalignment on α and β to the vane
-//! biases, and otherwise the path follows the vanes.
+//! vector x in the rotated axes are x − ε × x = x + x × ε to first order (Stevens, Lewis and Johnson, Aircraft Control and
+//! Simulation, section 1.3). This formula applies to body rates, specific force and the velocity relative to the air.
+//!
+//! The path is smoothed in the axes of gyros and attitude. Without vanes, α and β also refer to these axes. Vanes measure
+//! in the body axes. With vanes, the reconstruction attributes the mean effect of the misalignment on α and β to the vane
+//! biases. Apart from this mean, α and β of the path follow the vanes.
 
 use crate::flight_path::reconstruction::{Instant, Reconstruction};
 
@@ -32,7 +33,7 @@ pub fn attitude(roll: f64, pitch: f64) -> [[f64; 2]; 3] {
     [[1.0, 0.0], [tan_pitch * sin, cos], [tan_pitch * cos, -sin]]
 }
 
-/// Changes of α and β of a flight's path per rad of each angle.
+/// Changes of the reconstructed α and β of a flight per rad of each misalignment angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Turning {
     /// Mean change of α over the flight; `None` without an angle-of-attack vane.
@@ -59,8 +60,8 @@ impl Turning {
         }
     }
 
-    /// The changes at `alpha` and `beta` (rad). An angle with a vane has the mean change, an angle without a vane that of
-    /// [`flow`].
+    /// The changes at `alpha` and `beta` (rad). A flow angle that a vane measures has its mean change. A flow angle without
+    /// a vane has the change that [`flow`] returns.
     pub fn at(&self, alpha: f64, beta: f64) -> [[f64; 2]; 3] {
         let turned = flow(alpha, beta);
         std::array::from_fn(|axis| {
@@ -70,7 +71,7 @@ impl Turning {
     }
 }
 
-/// Changes of a measured state per rad of each angle, in the order and units of the state. `turning` states the changes of α
+/// Changes of a measured state per rad of each angle, in the order and units of the state. `turning` gives the changes of α
 /// and β.
 pub fn state(turning: &Turning, state: &[f64; 8]) -> [[f64; 8]; NAMES.len()] {
     let [roll, pitch, _, p, q, r, alpha, beta] = *state;
@@ -87,7 +88,7 @@ mod tests {
     use super::*;
     use nalgebra::{Rotation3, Vector3};
 
-    /// Compared with finite differences of rotation matrices.
+    /// The analytic changes equal finite differences of rotation matrices.
     #[test]
     fn a_small_turn_moves_vectors_angles_and_attitude() {
         const STEP: f64 = 1e-6;

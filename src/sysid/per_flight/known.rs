@@ -76,7 +76,7 @@ fn with_trims(model: &GreyBox, own: &FlightConstants) -> GreyBox {
     let mut bare = model.clone();
     bare.known = Default::default();
     let Some(values) = own.trims else { return bare };
-    // a model that already has trims belongs to a fit, and the fit estimates the trims
+    // a model that already has trims belongs to a fit: the fit estimates the trims, so they are not set here
     match trims::joined(&bare) {
         Ok(mut with) => {
             trims::set(&mut with, &values);
@@ -107,13 +107,14 @@ pub fn put_right(known: &Known, flights: &[Reconstruction]) -> (Vec<Reconstructi
     (right, named)
 }
 
-/// Names of those `flights` for which `known` has trims.
+/// Names of the flights for which `known` has trims.
 pub fn trimmed<'a>(known: &Known, flights: &'a [Reconstruction]) -> Vec<&'a str> {
     let has = |f: &&Reconstruction| known.of(&f.name).is_some_and(|own| own.trims.is_some());
     flights.iter().filter(has).map(|f| f.name.as_str()).collect()
 }
 
-/// Note of a search that does not use the constants in `known` of those `flights` that have any.
+/// Note that a search for missing effects ignores constants in `known`, with the names of those `flights` that have such
+/// constants. `None` if there are none.
 pub fn not_used(known: &Known, flights: &[&Reconstruction]) -> Option<String> {
     let has = |f: &&&Reconstruction| known.of(&f.name).is_some();
     let names: Vec<&str> = flights.iter().filter(has).map(|f| f.name.as_str()).collect();

@@ -1,7 +1,7 @@
 //! Constants that differ between the flights of one aircraft: trims, and the misalignment of the measured axes.
 //!
 //! Loading, the setting of a surface, a battery or a propeller may change between two flights. An autopilot's board or the
-//! markers of motion capture may be mounted again. These changes are not effects that the model lacks. Their constants are
+//! markers of motion capture may be removed and mounted again. The model lacks no effect in these cases. The constants are
 //! estimated only on request, for each flight, in addition to the coefficients common to all flights.
 
 pub mod askew;

@@ -1,6 +1,7 @@
 //! Trims of each flight: constants added to the model's coefficients, and a relative change of the thrust.
 //!
-//! The trims are added to a model as an effect outside the catalogue. The model needs no coefficients of the same names.
+//! The trims are added to a model as an effect outside the catalogue. The model does not need coefficients of the same
+//! names.
 
 use greylag_model::{GreyBox, JoinError};
 use greylag_physics::formula::register;
@@ -8,7 +9,7 @@ use greylag_physics::formula::register;
 /// A trim with its prior standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trim {
-    /// Name of the trim; a coefficient has its name in the catalogue.
+    /// Name of the trim. A trim of a coefficient has the name of the coefficient in the catalogue.
     pub name: &'static str,
     /// Standard deviation between flights, dimensionless.
     pub width: f64,
@@ -21,10 +22,10 @@ const fn trim(name: &'static str, width: f64) -> Trim {
 /// The trims in the order of the effect's coefficients, with their assumed standard deviations between flights of one
 /// aircraft.
 ///
-/// Assumed causes. Lift: half a degree of incidence of a wing that was mounted again, at a slope of 4 to 5 per rad. Pitch: a
-/// shift of the centre of gravity by 1 to 2 % of the chord at a lift coefficient of 0.5, or half a degree of elevator. Roll
-/// and yaw: a degree of one surface. Side force: two degrees of a fin. Drag: a hatch, tape or a dirty wing. Thrust: the
-/// squared voltage of a battery between full and half empty, or another propeller.
+/// The following causes are assumed. Lift: half a degree of incidence of a wing that was mounted again, at a slope of 4 to
+/// 5 per rad. Pitch: a shift of the centre of gravity by 1 to 2 % of the chord at a lift coefficient of 0.5, or half a
+/// degree of elevator. Roll and yaw: a degree of one surface. Side force: two degrees of a fin. Drag: a hatch, tape or a
+/// dirty wing. Thrust: the squared voltage of a battery between full and half empty, or another propeller.
 pub const TRIMS: [Trim; 7] = [
     trim("CD0", 0.005),
     trim("CL0", 0.03),

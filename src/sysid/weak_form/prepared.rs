@@ -1,5 +1,5 @@
-//! Preparation of a reconstructed flight for a comparison: resamples to model steps, keeps the parts in flight, divides them
-//! into windows.
+//! Preparation of a reconstructed flight for a comparison: resamples to model steps, keeps the parts in flight, and divides
+//! them into windows.
 
 use std::borrow::Cow;
 use std::f64::consts::{PI, TAU};
@@ -123,7 +123,8 @@ impl Prepared {
         }
     }
 
-    /// The flight with deflections that are passed through the input effects of `model`, for example an actuator lag.
+    /// The flight with acting deflections: the recorded deflections passed through the input effects of `model`, for
+    /// example an actuator lag.
     pub fn acting(&self, model: &GreyBox) -> Cow<'_, Prepared> {
         if model.acts_at_once() {
             return Cow::Borrowed(self);

@@ -60,8 +60,8 @@ pub fn channels(model: &GreyBox, flight: &Prepared) -> Vec<Series> {
 
 /// Residuals (measured − predicted) of forces (N) and moments (N m) for an equation-error fit, a row for each window.
 ///
-/// The columns are D, L, Y, l, m, n. Forces are NaN in windows without specific force. The computation is much shorter than
-/// that of [`channels`].
+/// The columns are D, L, Y, l, m, n. Forces are NaN in windows without specific force. This function is much faster than
+/// [`channels`].
 pub fn force_and_moment_residuals(model: &GreyBox, flight: &Prepared) -> Vec<[f64; 6]> {
     let flight = &*flight.acting(model);
     let residual = |w: &Window| {
@@ -124,7 +124,8 @@ fn smooth(weights: &[f64], values: impl Iterator<Item = Vector<f64>>) -> Vector<
 /// A step between two samples.
 struct Step<'a> {
     from: &'a Instant,
-    /// End of the step for an integrator that also evaluates the model there, with the controls of the start; else `None`.
+    /// End of the step if the integrator also evaluates the model there (RK4); otherwise `None`. The controls are those of
+    /// the start.
     to: Option<&'a Instant>,
 }
 
@@ -240,8 +241,8 @@ fn noise_variance(model: &GreyBox, flight: &Prepared) -> [f64; 9] {
     variance
 }
 
-/// Part of the noise variance due to the measured side: accelerations weighted by the kernel; body rates, airspeed, α and β
-/// weighted by its slope.
+/// Noise variance of the measured values alone: accelerations are weighted by the kernel; body rates, airspeed, α and β by
+/// its slope.
 fn measured_noise(model: &GreyBox, flight: &Prepared, average: f64, slope: f64) -> [f64; 9] {
     let [_, _, v, p, q, r, alpha, beta] = flight.noise.map(|sd| sd * sd);
     let [fx, fy, fz] = flight.force_noise.map(|sd| (model.body.mass * sd).powi(2));
@@ -293,8 +294,8 @@ pub struct Columns {
 
 /// Columns of `model` over the windows of `flight`, as regressors for the measured channels.
 ///
-/// Shape constants and coefficients of effects on inputs or inertia have columns of zeros. The model is not linear in them, or
-/// they act on the measured side.
+/// Columns of zeros belong to shape constants, in which the model is nonlinear, and to coefficients of effects on inputs or
+/// inertia, which act on the measured side.
 pub fn columns(model: &GreyBox, flight: &Prepared) -> Columns {
     let flight = &*flight.acting(model);
     let names: Vec<String> = model.coefficients().iter().map(|c| c.name.clone()).collect();

@@ -1,4 +1,4 @@
-// Where the model fails: channels over variables, the flight over time, free runs from any moment.
+// The pane of errors: unexplained shares by channel and variable, the flight over time, free runs from any time.
 
 import { SYMBOL, command, complain, dots, draw, el, ink, line, percent, post, shade, show } from "./kit.js";
 
@@ -30,7 +30,7 @@ export function failing(of) {
   parts.command.replaceChildren(...[command(state.commands.compare)].filter(Boolean));
 }
 
-/** What an empty session shows: what will come, and where flights are to be had. */
+/** Content for an empty session: the steps of the work, and how to get flights. */
 function welcome() {
   const steps = [["1", "Drop flight logs", "the model is compared with them at once: in which channel, and where, it fails"],
     ["2", "Diagnose", "every effect of the catalogue against what the model leaves, beside what chance reaches"],
@@ -40,7 +40,7 @@ function welcome() {
     el("figure", {}, picture(), el("figcaption", {}, "What a diagnosis shows: dots are what the tuned model leaves of the drag, the line is the missing effect.")),
     el("p", { class: "note" }, "No log at hand? These two fly flights with a hidden effect, and open them with the model that lacks it: ", el("code", {}, "greylag mystery --seed 3 --out mystery && greylag workbench mystery/*.csv --model mystery/model.toml"))];
 }
-/** A picture of a diagnosis: what the model leaves over a variable, and the effect through it. */
+/** Picture of a diagnosis: a residual over a variable, and the curve of the effect. */
 function picture() {
   const ns = "http://www.w3.org/2000/svg";
   const svg = document.createElementNS(ns, "svg");
@@ -48,7 +48,7 @@ function picture() {
   const add = (tag, of) => { const n = document.createElementNS(ns, tag); for (const [k, v] of Object.entries(of)) n.setAttribute(k, v); svg.append(n); };
   for (let i = 0; i < 90; i++) {
     const x = (i - 44.5) / 45;
-    // dots scattered as measurements are, the same at every look
+    // dots with deterministic noise
     const noise = Math.sin(i * 12.9898) * 43758.5453;
     add("circle", { cx: 160 + 150 * x, cy: 130 - 105 * x * x - 16 * (noise - Math.floor(noise) - 0.5), r: 2, class: "dot" });
   }
@@ -80,12 +80,12 @@ function build() {
 
 // ---- which model ----
 
-/** Error of a model's free runs over so many seconds; undefined where the flights are too short. */
+/** Free-run error (NRMSE) of a model at the horizon `seconds`; undefined if the flights are too short. */
 const error_over = (seconds, model) => model?.free_run.find((h) => h.horizon_s === seconds)?.rmse_scaled;
 
-/** The model that is shown before the effects: tuned as soon as that is known, as given if the reader asks for it. */
+/** The displayed model without effects: the tuned one if it is known and the user has not selected the given one. */
 const way = (ways) => (ways.includes("tuned") && pick.base !== "given" ? "tuned" : "given");
-/** Of a list with one entry a model: that model's, and the amended one's if there is one. */
+/** From a list with one entry for each model: the entry of the displayed model, then of the amended model if there is one. */
 const two = (list, ways) => [list[ways.indexOf(way(ways))], list[ways.indexOf("amended")]];
 const models = () => two(bench.failing.models, bench.failing.ways).filter(Boolean);
 const word = () => WORD[way(bench.failing.ways)];
@@ -125,14 +125,14 @@ function grid() {
   parts.grid.replaceChildren(table, el("p", { class: "note" }, `R²: what the model explains, ${word()}${after ? `; after: ${with_effects()}` : ""}. Numbers: how much of what is left goes with each variable, %. ${narrow.matches ? "" : `${symbols}.`}`));
   finding();
 }
-/** A row a channel. */
+/** The table with one row for each channel. */
 function upright(shown, fits, one) {
   const head = el("tr", {}, el("th", { scope: "col" }, "Channel"), fits.map(([sign, title]) => el("th", { scope: "col", class: "number", title }, sign)),
     VARIABLES.map((v) => el("th", { scope: "col", class: "number" }, el("abbr", { title: name(shown, v) }, SYMBOL[v]))));
   const rows = shown.map((c) => el("tr", {}, el("th", { scope: "row" }, c.name), fits.map(([, , of]) => el("td", { class: "fit" }, of(c))), VARIABLES.map((v) => one(c, v))));
   return el("table", { class: "grid" }, el("thead", {}, head), el("tbody", {}, rows));
 }
-/** A column a channel, for a screen too narrow for a column a variable. */
+/** The table with one column for each channel, for a screen that is too narrow for one column for each variable. */
 function turned(shown, fits, used, one) {
   const head = el("tr", {}, el("td"), shown.map((c) => el("th", { scope: "col" }, c.name)));
   const top = fits.map(([sign, title, of]) => el("tr", {}, el("th", { scope: "row", title }, sign), shown.map((c) => el("td", { class: "fit" }, of(c)))));
@@ -152,7 +152,7 @@ function cell(channel, bins, size) {
     onclick: () => { Object.assign(pick, { channel: channel.channel, variable: bins.variable, by_hand: true }); pressed_cell(); },
   }, bins.explained >= 0.05 ? String(Math.round(100 * bins.explained)) : "");
 }
-/** A cell was pressed: its seconds are lit everywhere, in a flight that has some. */
+/** Updates the pane after a cell was chosen: its times are highlighted, in another flight if this one has none. */
 function pressed_cell() {
   grid();
   bench.light(lit);
@@ -162,7 +162,7 @@ function pressed_cell() {
     brush();
   }
 }
-/** The channel and the variable that an effect acts in stand chosen: its own plots follow the tick. */
+/** Chooses the channel and the variable in which an effect acts, so that the plots show the accepted effect. */
 export function follow(effect) {
   const channels = bench?.failing && models()[0].channels;
   const channel = effect && channels?.find((c) => c.channel === (effect.curve?.channel ?? effect.channels[0]));
@@ -170,7 +170,7 @@ export function follow(effect) {
   const named = channel.bins.find((b) => VARIABLES.includes(b.variable) && effect.curve?.variable.startsWith(b.name));
   Object.assign(pick, { channel: channel.channel, variable: named?.variable ?? pick.variable, by_hand: true });
 }
-/** Where a missing effect was found, the cell it acts in stands chosen at first; else the cell that says most. */
+/** Initial choice: the cell in which an asserted effect acts, else the cell that explains most of the residual. */
 function start(channels) {
   const found = way(bench.failing.ways) === "tuned" ? bench.diagnosis?.effects.find((e) => e.asserted && e.curve) : null;
   const channel = found && channels.find((c) => c.channel === found.curve.channel);
@@ -188,7 +188,7 @@ function start(channels) {
 }
 const chosen = (model) => model?.channels.find((c) => c.channel === pick.channel);
 const over = (channel) => channel?.bins.find((b) => b.variable === pick.variable);
-/** The bin in which the model is off most before the effects. */
+/** The bin with the largest mean residual of the model without effects. */
 function worst() {
   const bins = over(chosen(models()[0]))?.bins ?? [];
   const supported = bins.filter((b) => b.supported);
@@ -201,7 +201,7 @@ function finding() {
 
 // ---- over time ----
 
-/** The seconds of a flight in which the variable lies in the worst bin. */
+/** The time intervals (s) of a flight in which the variable lies in the worst bin. */
 export function lit(flight = bench.flight) {
   const bin = worst();
   if (!flight || !bin) return [];
@@ -229,7 +229,7 @@ function quality(measured, predicted, inside) {
 const key = (tone, word, more) => el("span", { class: `key ${tone}` }, el("i"), el("span", {}, word, more ? ` ${more}` : ""));
 
 const sync = { key: "flight", setSeries: false };
-/** Options that all plots over time share: cursor, zoom, lit seconds, a click that flies. */
+/** Options of all plots over time: cursor, zoom, highlighted times, and a click that starts a free run. */
 function clock(series, spans) {
   let down = null;
   return {
@@ -260,7 +260,7 @@ function zoom(window) {
   states();
   brush();
 }
-/** Marks the cells whose failing seconds the brushed window holds. */
+/** Marks the cells whose worst bin is frequent in the zoomed window. */
 function brush() {
   const { flight } = bench;
   for (const button of parts.grid.querySelectorAll("button")) {
@@ -280,7 +280,7 @@ function brush() {
   }
 }
 
-/** A flight, or models, that are new: everything over time is drawn again. */
+/** Draws all plots over time again, for a new flight or new models. */
 export function freshFailing(of) {
   bench = of;
   if (!parts) return;
@@ -325,7 +325,7 @@ function time() {
   maps();
 }
 
-/** Mean residual over α and β, by each model on one scale. */
+/** Maps of the mean residual over α and β, one for each model, on one colour scale. */
 function maps() {
   const all = models().map((m) => chosen(m)?.map).filter((m) => m?.cells.length);
   if (!all.length) return parts.map.replaceChildren();
@@ -376,7 +376,7 @@ export const repaint = () => parts?.map.paint?.();
 const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 const symbol = (channel) => ({ V: "V̇", alpha: "α̇", beta: "β̇" })[channel] ?? channel;
 
-/** Mean residual over the variable, with its interval. */
+/** Plot of the mean residual over the variable, with its interval. */
 function bins(channel, variable) {
   if (!variable) return;
   const both = models().map((m) => over(chosen(m))?.bins ?? []);
@@ -432,7 +432,7 @@ function states() {
   if (parts.states.childElementCount !== names.length) {
     parts.states.replaceChildren(...names.map((n) => el("figure", {}, el("figcaption"), el("div", { class: "plot", "data-plot": n }))));
   }
-  // a window around the run shows it; the whole flight would hide it
+  // a window around the free run is shown, because the run would be invisible in the whole flight
   const around = pick.window ?? (pick.at == null ? null : [pick.at - 3, pick.at + RUN_S + 3]);
   const spans = lit();
   const flown = pick.run ? two(pick.run, pick.run.map((r) => r.way)).filter(Boolean) : [];
@@ -449,7 +449,7 @@ function states() {
     draw(plot, options, [x, ...models, measured]);
   });
 }
-/** A time for a row that only breaks the line. */
+/** A time for a row without values, which interrupts the line. */
 function between(times, i) {
   const before = times[i - 1] ?? 0;
   return before + 1e-3;

@@ -1,4 +1,4 @@
-// Failsafes: each choice is flown at once; only the choices that bear on the others are shown.
+// Page of failsafes. Each change of the form flies the scenario at once. Fields that do not apply are hidden.
 
 const root = document.documentElement;
 const dark = matchMedia("(prefers-color-scheme: dark)");
@@ -11,7 +11,7 @@ const form = document.getElementById("choices");
 const flown = document.getElementById("flown");
 const field = (name) => form.elements[name];
 
-/** A field with its label is there or not; what is not there is not sent. */
+/** Shows or hides a field with its label. A hidden field is not sent. */
 function offer(name, there) {
   const place = form.querySelector(`[data-field="${name}"]`);
   if (place) place.hidden = place.disabled = !there;
@@ -34,7 +34,7 @@ function suit() {
   if (station.disabled && station.selected) field("request").value = "none";
 }
 
-/** Shows which example is flown. */
+/** Marks the example that is flown. */
 function name_example() {
   for (const a of document.querySelectorAll(".examples a")) {
     if (a.href === location.href || (!location.search && a.search === "")) a.setAttribute("aria-current", "true");
@@ -42,7 +42,7 @@ function name_example() {
   }
 }
 
-/** The command and its file can be copied. */
+/** Adds buttons that copy the command and the scenario file. */
 function copies() {
   for (const id of ["command", "scenario"]) {
     const text = document.getElementById(id);
@@ -59,7 +59,7 @@ function copies() {
 }
 
 let asked = null;
-/** Takes from the answer's page what came of the flight. */
+/** Requests the page at `address` and takes the result of the flight from it. */
 async function fly(address, { push, take_choices }) {
   asked?.abort();
   const own = (asked = new AbortController());
@@ -80,7 +80,7 @@ async function fly(address, { push, take_choices }) {
     suit();
     copies();
     name_example();
-    // the sentence alone is read out, not the page
+    // a screen reader reads only the verdict, not the page
     document.getElementById("heard").textContent = flown.querySelector(".verdict")?.textContent ?? "";
     root.dataset.flown = address;
   } catch (error) {
@@ -102,7 +102,7 @@ form.addEventListener("change", () => {
 form.addEventListener("submit", (event) => {
   event.preventDefault();
   fly(address(), { push: true }).then(() => {
-    // on a narrow page the answer is below the choices
+    // on a narrow page the result is below the form
     if (flown.getBoundingClientRect().top > innerHeight / 2) flown.scrollIntoView({ block: "start" });
   });
 });

@@ -1,4 +1,4 @@
-// The flights: what each log is, what it serves for, and the flight at a glance.
+// The pane of flights: for each log its format, its role, the purposes that it suffices for, and a small plot.
 
 import { command, el, ink, show } from "./kit.js";
 
@@ -40,7 +40,7 @@ function one(bench, flight, place, kept) {
   return node;
 }
 
-/** What is wrong with the log, what it serves for, which errors its sensors have. */
+/** Findings about the log, the purposes that it suffices for, and the estimated sensor errors. */
 function about(bench, flight, place, kept) {
   const details = (key, summary, lines, open) => {
     const id = `${flight.path}-${key}`;

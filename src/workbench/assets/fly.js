@@ -1,4 +1,5 @@
-// Fly it: a simulator flight with the model, or another program's recording, measured against predicted while it flies.
+// The pane of flights: a simulator flight with the model, or a recording of another program. Measured values are
+// compared with predictions during the flight.
 
 import { command, complain, draw, el, get, ink, line, show } from "./kit.js";
 
@@ -24,13 +25,13 @@ export function fly(of) {
   parts.start.title = can.possible ? "" : "This program was built without the simulator";
   parts.stop.disabled = !can.on;
   past();
-  // a page that was opened later, or has missed a part, asks for all of it
+  // a page that was opened later or missed a part requests the whole flight
   if (can.number != null && flight?.number !== can.number) load();
   else if (flight && flight.on !== can.on) { flight.on = can.on; paint(); }
   status();
 }
 
-/** The options of a select, kept as long as they stay the same. */
+/** Sets the options of a select. They are kept if their number is the same. */
 function choices(select, list) {
   if (select.childElementCount === list.length) return;
   const before = select.value;
@@ -72,13 +73,13 @@ function start() {
   const { schedule, controller, aircraft, hide, turbulence, seed } = parts;
   bench.act({ do: "fly", schedule: schedule.value, controller: controller.value, aircraft: aircraft.value, hide: hide.value, turbulence: turbulence.value ? +turbulence.value : null, seed: +seed.value });
 }
-/** Chooses a schedule that was made, in this pane. */
+/** Selects a schedule in this pane. */
 export function offer(schedule) {
   parts.schedule.value = schedule;
   parts.start.focus();
 }
 
-/** Asks for the whole flight. */
+/** Requests the whole flight from the server. */
 async function load() {
   try {
     const whole = await get("/api/flying");
@@ -90,7 +91,7 @@ async function load() {
     complain(error.message);
   }
 }
-/** A part of the flight, as it comes. */
+/** Appends a new part of the flight. If parts are missing, the whole flight is requested. */
 export function part(news) {
   if (!bench) return;
   if (flight?.number !== news.number || news.from !== flight.from + flight.live.time_s.length) return void load();
@@ -106,7 +107,7 @@ export function part(news) {
 }
 
 const TONES = ["before", "after"];
-/** The band of a model about its prediction. */
+/** Draws the monitor's band around the prediction of each model in channel `k`. */
 function bands(u, k) {
   const { time_s, models } = flight.live;
   models.forEach((model, m) => {
@@ -127,7 +128,7 @@ function bands(u, k) {
 }
 const keys = (models) => [el("span", { class: "key measured" }, el("i"), "measured"), ...models.map((m, i) => el("span", { class: `key ${TONES[i]}` }, el("i"), `${m.model}, predicted with its band`))];
 
-/** A plot a channel and a state. */
+/** Makes one plot for each channel and each state. */
 function setup() {
   const { models } = flight.live;
   const x = { time: false, range: (u, low, high) => (flight.on ? [Math.max(low, high - WINDOW_S), Math.max(high, low + WINDOW_S)] : [low, high]) };
@@ -160,7 +161,7 @@ function paint() {
     setup();
   }
   for (const { plot, data } of parts.drawn ?? []) plot.setData(data());
-  // how far outside the last model's residual stands now
+  // marks the channels in which the residual of the last model is outside its band
   const model = live.models[live.models.length - 1];
   parts.drawn?.slice(0, 6).forEach(({ title }, k) => {
     const share = model?.share[k].findLast((v) => v != null);
@@ -187,7 +188,7 @@ function status() {
 }
 const OUTCOMES = { flying: "flying", flown: "flown to its end", stopped: "stopped", failed: "failed", cut_off: "cut off, for the workbench ended" };
 
-/** The flights of this session. */
+/** Lists the finished flights of this session. */
 function past() {
   const { flown } = bench.state;
   const list = flown.map((f, k) => [f, k]).filter(([f]) => f.outcome !== "flying").reverse();

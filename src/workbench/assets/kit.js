@@ -1,6 +1,6 @@
-// Elements, requests, numbers and plots: what all panes use.
+// Functions of all panes: elements, requests, numbers and plots.
 
-/** An element with properties and children; a child that is false or null is left out. */
+/** Makes an element with properties and children. A child that is false or null is left out. */
 export function el(tag, properties = {}, ...children) {
   const node = document.createElement(tag);
   for (const [key, value] of Object.entries(properties)) {
@@ -15,7 +15,7 @@ export function el(tag, properties = {}, ...children) {
 }
 
 const trouble = document.getElementById("trouble");
-/** Says what went wrong, until it is closed. */
+/** Shows an error message until the user closes it. */
 export function complain(text) {
   trouble.replaceChildren(el("p", {}, el("span", {}, text), el("button", { type: "button", onclick: () => trouble.replaceChildren() }, "Close")));
 }
@@ -47,16 +47,16 @@ export const SYMBOL = {
   alpha: "α", beta: "β", airspeed: "V", throttle: "δt", p: "p", q: "q", r: "r", aileron: "δa", elevator: "δe",
   aileron_rate: "δ̇a", elevator_rate: "δ̇e", altitude: "h", time: "t", flight: "flight",
 };
-/** The score at the horizon of judgement: the longest up to 5 s that runs reach. */
+/** The score at the longest horizon that runs reach, up to 5 s. */
 const reached = (scores) => (scores ?? []).filter((s) => s.runs > 0 && s.horizon_s <= 5.001 && s.rmse_scaled != null).pop();
-/** The error there. */
+/** The error (NRMSE) at this horizon. */
 export const judged = (scores) => reached(scores)?.rmse_scaled ?? null;
-/** The horizon itself in words. */
+/** Text on this horizon. */
 export const horizon = (scores) => (reached(scores) ? ` at ${show(reached(scores).horizon_s, 1)} s` : "");
-/** What the fit of the most effects says: it has the last word on each of them. */
+/** Result of the fit with the most accepted effects. It is the valid one for all effects. */
 export const verdicts = (state) => [...state.stack].reverse().find((s) => s.story)?.story ?? null;
 
-/** The command that does the same, with a button that copies it. */
+/** The equivalent command, with a button that copies it. */
 export function command(text, what = "The same") {
   if (!text) return null;
   const copy = el("button", { type: "button", onclick: async () => {
@@ -84,7 +84,7 @@ const axis = (extra) => ({
 });
 const ticks = (u, values) => values.map((v) => (v == null ? "" : String(+v.toPrecision(6)).replace("-", "−")));
 
-/** Draws `data` by `options` of uPlot into `holder`, whose plot goes. */
+/** Draws `data` with the uPlot options `options` in `holder`. A previous plot there is removed. */
 export function draw(holder, options, data) {
   holder.plot?.destroy();
   plots.delete(holder.plot);
@@ -100,12 +100,12 @@ export function draw(holder, options, data) {
   return plot;
 }
 export const line = (tone, width = 1.6, extra = {}) => ({ stroke: () => ink(tone), width, points: { show: false }, ...extra });
-/** Paths of dots only. */
+/** Series options for dots without a line. */
 export const dots = (tone, size = 3) => ({ stroke: () => ink(tone), paths: () => null, points: { show: true, size, width: 0, fill: () => ink(tone) } });
 export function redraw() {
   for (const plot of plots) if (plot.root.isConnected) plot.redraw(false, true); else plots.delete(plot);
 }
-/** Fills the inside of a plot between two values of x. */
+/** Shades the plot over the x ranges `spans`. */
 export function shade(u, spans, tone) {
   const { ctx, bbox } = u;
   ctx.save();

@@ -1,4 +1,4 @@
-// The workbench: one session, four panes, kept as the program has it.
+// The workbench page: a session in several panes, which show the state of the program.
 
 import { complain, el, get, horizon, hush, judged, percent, post, redraw, send, show, verdicts } from "./kit.js";
 import { flights } from "./flights.js";
@@ -10,7 +10,7 @@ import { model } from "./model.js";
 
 const root = document.documentElement;
 const dark = matchMedia("(prefers-color-scheme: dark)");
-/** Everything that is drawn takes the colours anew. */
+/** Sets the theme and redraws everything in its colours. */
 function wear(theme) {
   root.dataset.theme = theme;
   redraw();
@@ -18,7 +18,7 @@ function wear(theme) {
   repaint();
 }
 
-/** What the panes share. */
+/** State and functions that the panes share. */
 const bench = {
   state: null, failing: null, diagnosis: null, proposal: null, waited_for: null, show: show_middle, flight: null, chosen: 0, chosen_path: null, data: new Map(), lit: new Map(), act, upload, choose, light, choose_lit, by_hand: false,
 };
@@ -28,7 +28,7 @@ dark.addEventListener("change", () => wear(dark.matches ? "dark" : "light"));
 document.getElementById("theme").addEventListener("click", () => wear(root.dataset.theme === "dark" ? "light" : "dark"));
 
 let fresh = 0;
-/** Asks for everything again and shows it; an older answer that comes late is left alone. */
+/** Requests the state and the results again and shows them. Late answers to an older request are ignored. */
 async function refresh(state) {
   const own = ++fresh;
   try {
@@ -53,7 +53,7 @@ async function refresh(state) {
 async function load_flight(own = fresh) {
   const all = bench.state.flights;
   const open = (f) => f && !f.error && !f.locked;
-  // by its path: places shift where a flight is taken out
+  // the flight is found by its path, because indices shift when a flight is removed
   bench.chosen = all.findIndex((f) => f.path === bench.chosen_path);
   if (!open(all[bench.chosen])) bench.chosen = Math.max(0, all.findIndex(open));
   bench.chosen_path = all[bench.chosen]?.path ?? null;
@@ -61,26 +61,26 @@ async function load_flight(own = fresh) {
   bench.flight = open(all[bench.chosen]) ? await data(bench.chosen) : null;
   if (own !== fresh) return;
   freshFailing(bench);
-  // the others behind it, so that a cell lights their seconds too
+  // the other flights are loaded afterwards, because the chosen cell highlights times in them too
   for (const place of all.keys()) if (open(all[place]) && own === fresh) await data(place);
   if (own !== fresh) return;
   light();
   if (!bench.by_hand && bench.flight) choose_lit();
 }
-/** A flight over time, asked for once. */
+/** Data of a flight over time; requested only once. */
 async function data(place) {
   if (!bench.data.has(place)) bench.data.set(place, await get(`/api/flight/${place}`));
   return bench.data.get(place);
 }
 let lights = () => [];
-/** Lights the seconds of the pressed cell in all flights. */
+/** Highlights the times of the chosen cell in all flights. */
 function light(by = lights) {
   lights = by;
   bench.lit = new Map([...bench.data].map(([place, flight]) => [place, lights(flight)]));
   flights(bench);
 }
 const seconds = (spans) => (spans ?? []).reduce((sum, [from, to]) => sum + to - from, 0);
-/** Chooses the flight with most lit seconds if the chosen one has none; whether it did. */
+/** If the chosen flight has no highlighted time, chooses the flight with most of it. Returns whether it did. */
 function choose_lit() {
   if (seconds(bench.lit.get(bench.chosen)) > 0) return false;
   const [place] = [...bench.lit].sort((a, b) => seconds(b[1]) - seconds(a[1]))[0] ?? [];
@@ -100,7 +100,7 @@ function show_all() {
   fly(bench);
   model(bench);
 }
-/** Shows one of the two middle panes, where there is room for one; a schedule to be flown is chosen. */
+/** Shows one of the two middle panes if there is room for only one. Also selects `schedule` for a flight. */
 function show_middle(pane, schedule) {
   document.querySelector(".middle").dataset.shown = pane;
   for (const name of ["failing", "fly"]) document.getElementById(`show-${name}`).setAttribute("aria-pressed", name === pane ? "true" : "false");
@@ -110,14 +110,14 @@ function show_middle(pane, schedule) {
 }
 for (const name of ["failing", "fly"]) document.getElementById(`show-${name}`).addEventListener("click", () => show_middle(name));
 
-/** The session's answer in one line. */
+/** Shows the session's answer in one line: the error before and after the effects. */
 function answer() {
   const { state } = bench;
   const place = document.getElementById("answer");
   const story = verdicts(state);
   const name = el("b", {}, state.model.name);
   if (!story) return place.replaceChildren(name);
-  // tuning and effect apart: what wrong coefficients were worth, and what the effect is
+  // the reductions of the error by tuning and by the effects are shown separately
   const joined = story.effects.filter((e) => e.joined).map((e) => e.id);
   const steps = [["as given", judged(story.given)], ["tuned", judged(story.before)], ...(joined.length ? [[joined.join(" + "), judged(story.after)]] : [])];
   const parts = steps.flatMap(([word, error], k) => {
@@ -137,11 +137,11 @@ function job() {
 }
 const WORK = { diagnosis: "diagnosis", fit: "fit", proposal: "search for a formula", schedule: "search for a schedule" };
 
-/** Asks for a change; whatever comes of it is shown. */
+/** Requests a change of the session and shows the new state or the error. Returns whether it succeeded. */
 async function act(what) {
   hush();
   if (what.do === "propose") bench.waited_for = "proposal";
-  // the large plot goes where the effect acts
+  // the large plot changes to the channel in which the effect acts
   if (what.do === "tick") follow(bench.diagnosis?.effects.find((e) => e.id === what.effect));
   try {
     await refresh(await post("/api/act", { revision: bench.state.revision, act: what }));
@@ -164,7 +164,7 @@ async function upload(files) {
     flights(bench);
     try {
       await take(file).catch(async (error) => {
-        // the session was changed meanwhile, as by a flight that ended: what a drop means is the same
+        // the session has changed meanwhile, for example because a flight ended; the upload is still valid
         if (error.status !== 409) throw error;
         bench.state = await get("/api/state");
         await take(file);
@@ -190,7 +190,7 @@ async function choose(place) {
   }
 }
 
-// ---- what happens ----
+// ---- events of the server and dropped files ----
 
 let later = 0;
 const events = new EventSource("/api/events");
@@ -211,7 +211,7 @@ events.addEventListener("message", (message) => {
   }
 });
 
-// files may be dropped anywhere
+// files may be dropped anywhere on the page
 addEventListener("dragover", (event) => { event.preventDefault(); document.querySelector(".drop")?.classList.add("over"); });
 addEventListener("dragleave", () => document.querySelector(".drop")?.classList.remove("over"));
 addEventListener("drop", (event) => {

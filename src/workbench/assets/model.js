@@ -1,4 +1,4 @@
-// The model: the accepted effects with the error after each, judged, taken back, saved.
+// The model pane: the accepted effects, the error after each of them, and buttons to judge, undo and save.
 
 import { command, el, horizon, judged, show, verdicts } from "./kit.js";
 
@@ -24,13 +24,13 @@ export function model(bench) {
     buttons, saved.note, opened(state), command(state.commands.amend, "Model and Save"), command(state.commands.judge, "Judge")].filter(Boolean));
 }
 
-/** The answer, as the command `amend` prints it. */
+/** The answer in the words of the command `amend`. */
 function box(state) {
   const told = verdicts(state)?.answer;
   return told && el("div", { class: "verdict effect", id: "box" }, [told.error, told.effect, told.left].filter(Boolean).map((line) => el("p", {}, line)));
 }
 
-/** What a saved model is about: it is another one when the stack or the model changes. */
+/** Identity of the saved model. It changes with the accepted effects and with the given model. */
 const key = (state) => JSON.stringify([state.model, state.diagnosis.key, state.stack.map((s) => [s.id, s.anyway, s.status])]);
 let saved = { key: null, note: null };
 async function save(bench) {
@@ -41,7 +41,7 @@ async function save(bench) {
   }
 }
 
-/** NRMSE: as given, tuned, and after each effect, on fit, held-out and test flights. */
+/** Table of the NRMSE on fit, held-out and test flights: as given, tuned, and after each effect. */
 function errors(state) {
   const rows = [];
   const fitted = state.stack.filter((s) => s.story);
@@ -58,7 +58,7 @@ function errors(state) {
   if (!rows.length) return null;
   const last = state.openings.filter((o) => o.occasion === "judged").pop();
   const joined = (story?.effects ?? []).filter((e) => e.joined).map((e) => e.id);
-  // the amended model is the last row's, if its fit is done
+  // the last row is the amended model if its fit is complete
   const about = last && state.stack.every((s) => s.story) && last.effects.join() === joined.join();
   const test = (k) => (last && k === 0 ? last.given : about && k === rows.length - 1 ? last.amended : null);
   const all = rows.map((r, k) => [...r, test(k)]);
@@ -82,7 +82,7 @@ function step(bench, s) {
     refused.length > 0 && !own.joined && last && el("div", { class: "row" }, el("button", { type: "button", onclick: () => bench.act({ do: "keep" }) }, "Keep it anyway"), el("button", { type: "button", onclick: () => bench.act({ do: "undo" }) }, "Take it back")));
 }
 
-/** The looks at the test flights. */
+/** Records of the openings of the test flights. */
 function opened(state) {
   const count = state.openings.length;
   const tests = state.flights.filter((f) => f.role === "test");

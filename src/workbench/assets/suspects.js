@@ -1,4 +1,4 @@
-// The suspects: candidate effects ranked, each with what speaks for and against it; a tick accepts one.
+// The pane of suspects: candidate effects in the order of their evidence. A tick accepts an effect.
 
 import { command, draw, el, ink, line, percent, show } from "./kit.js";
 
@@ -20,7 +20,7 @@ export function suspects(bench) {
     const hint = !running && !said && el("p", { class: "note" }, ready ? "Fits every effect of the catalogue to what the model leaves, and compares each with what chance reaches." : "Needs a flight to fit to.");
     return body.replaceChildren(el("div", { class: "row" }, ask), ...[said, hint, running && first(running)].filter(Boolean), ...end);
   }
-  // the list stays as it is while nothing of it changes, so that plots and focus stay
+  // an unchanged list is not rebuilt, so that plots and keyboard focus are kept
   const now = JSON.stringify([state.diagnosis.key, state.diagnosis.behind, state.stack.map((s) => [s.id, s.status]), state.commands.diagnose, state.jobs.length > 0]);
   if (now === before) return;
   before = now;
@@ -36,7 +36,7 @@ export function suspects(bench) {
   curves(body, diagnosis);
 }
 
-/** The ranking while the checks still run. */
+/** The first ranking, shown while the checks still run. */
 function first(job) {
   const best = job.ranking.slice(0, 5).filter((c) => c.evidence > 0);
   if (!best.length) return el("p", { class: "note" }, `${job.doing} …`);
@@ -56,7 +56,7 @@ const ticked = (bench, id) => bench.state.stack.some((s) => s.id === id);
 function suspect(bench, e, most) {
   const stack = bench.state.stack;
   const on = ticked(bench, e.id);
-  // only what was accepted last can be taken back
+  // only the effect that was accepted last can be removed
   const fixed = on && stack[stack.length - 1].id !== e.id;
   const box = el("input", { type: "checkbox", checked: on, disabled: fixed, "data-effect": e.id, title: fixed ? "Take back the effects accepted after it first" : "",
     onchange: () => bench.act(on ? { do: "undo" } : { do: "tick", effect: e.id }).then((done) => { if (!done) box.checked = on; }) });
@@ -70,7 +70,7 @@ function suspect(bench, e, most) {
   return el("article", { class: `suspect ${e.asserted ? "asserted" : ""}` },
     el("label", {}, box, el("span", {}, e.id, " ", tag)),
     el("p", { class: "muted" }, e.description),
-    // the curve proves it: it stands before the words
+    // the curve is the main evidence, so it comes before the text
     e.curve && above ? el("figure", {}, el("figcaption", {}, el("b", {}, `${e.curve.channel} (${e.curve.unit}) over ${e.curve.variable}`), el("span", { class: "muted" }, "dots: what the tuned model leaves; line: the effect")), el("div", { class: "plot", "data-curve": e.id })) : "",
     el("div", { class: "meter", role: "img", "aria-label": `evidence ${show(e.evidence)}, chance reaches ${show(e.threshold)}`, title: `evidence ${show(e.evidence)}; chance reaches ${show(e.threshold)} (log scale)` },
       el("i", { vars: { width: `${log(e.evidence)}%` } }), el("b", { vars: { left: `${log(e.threshold)}%` } })),
@@ -80,7 +80,7 @@ function suspect(bench, e, most) {
     e.indistinguishable_from.length ? el("div", { class: "row" }, e.indistinguishable_from.map((other) => apart(bench, [e.id, other]))) : "",
     more("Do the flights agree?", agreement(e), `agree-${e.id}`));
 }
-/** Every coefficient by flight: first the one on which the flights differ most, in standard deviations. */
+/** Estimates of each coefficient by flight. The coefficient on which the flights differ most, in standard deviations, comes first. */
 function agreement(e) {
   const alone = e.parameters.filter((p) => p.by_flight?.length > 1).sort((a, b) => spread(b) - spread(a));
   const one = (f) => el("li", {}, `${f.flight}: ${show(f.value)} ± ${show(1.96 * f.sd, 2)}`);
@@ -94,13 +94,13 @@ function spread(p) {
   const mean = known.reduce((sum, f) => sum + f.value * f.sd ** -2, 0) / weight;
   return Math.sqrt(known.reduce((sum, f) => sum + ((f.value - mean) / f.sd) ** 2, 0) / (known.length - 1));
 }
-/** The coefficient that is clearest, with its 95 % interval. */
+/** Text on the coefficient with the narrowest 95 % interval relative to its value. */
 function decisive(e) {
   const clear = (p) => Math.abs(p.value) / (p.ci95[1] - p.ci95[0] || Infinity);
   const p = [...e.parameters].sort((a, b) => clear(b) - clear(a))[0];
   return p && `${p.name} = ${show(p.value)} (95 %: ${show(p.ci95[0])} to ${show(p.ci95[1])})${p.unit ? ` ${p.unit}` : ""}`;
 }
-/** Makes a schedule that tells two effects apart. */
+/** A button that starts the design of a schedule that distinguishes two effects. */
 function apart(bench, between) {
   return el("button", { type: "button", "data-between": between.join(" "), onclick: () => bench.act({ do: "design", between }) }, `Make a schedule that tells it from ${between[1]}`);
 }
@@ -109,13 +109,13 @@ function notes(bench, diagnosis) {
   return el("div", {}, more("What to fly next", fly, "fly"), more("Notes", diagnosis.notes.map((n) => el("p", {}, n)), "notes"));
 }
 
-/** What is left of the channel over the variable, and what the effect says of it. */
+/** Draws, for each effect shown, the residual over a variable and the effect's contribution. */
 function curves(body, diagnosis) {
   for (const holder of body.querySelectorAll("[data-curve]")) {
     curve(holder, diagnosis.effects.find((e) => e.id === holder.dataset.curve).curve);
   }
 }
-/** Draws a curve with its interval over the residual. */
+/** Draws the contribution of an effect with its interval, over the residual of the model without it. */
 export function curve(holder, { x, residual, at, contribution }) {
   const order = x.map((_, i) => i).sort((a, b) => x[a] - x[b]);
   const band = (u) => {

@@ -1,4 +1,4 @@
-// Effects as text: written, checked while they are written, tried like any suspect; formulas that are proposed.
+// Effects as text: the editor with its checks, the list of the user's effects, and proposed formulas.
 
 import { command, complain, el, get, post, show } from "./kit.js";
 import { curve } from "./suspects.js";
@@ -8,7 +8,7 @@ let bench = null;
 let parts = null;
 let later = 0;
 let asked = 0;
-/** The proposal that was put into the editor. */
+/** Key of the proposal that was put into the editor. */
 let taken = null;
 const curves = new Map();
 
@@ -60,7 +60,7 @@ function put(content) {
   check();
 }
 
-/** What the parser says of the text. */
+/** Checks the text and shows the parser's answer. */
 async function check() {
   const own_turn = ++asked;
   try {
@@ -74,7 +74,7 @@ async function check() {
     mark(found.error);
   } catch (error) { complain(error.message); }
 }
-/** A way to the line that the parser names. */
+/** Adds a button that goes to the line of the parser's error. */
 function mark(error) {
   const line = +(/line (\d+)/.exec(error ?? "")?.[1] ?? 0);
   if (line) parts.said.append(" ", el("button", { type: "button", onclick: () => go_to(line) }, `Go to line ${line}`));
@@ -95,7 +95,7 @@ async function keep(and_try) {
 
 const ticked = (id) => bench.state.stack.find((s) => s.id === id);
 let before = "";
-/** The effects of this session, each with a tick and, once tried, its curve. */
+/** Lists the user's effects, each with a checkbox and, if it is accepted, its curve. */
 function own() {
   const { state } = bench;
   const now = JSON.stringify([state.own, state.stack.map((s) => [s.id, s.status, !!s.estimated])]);
@@ -115,13 +115,13 @@ function one(e) {
     el("p", { class: "muted" }, e.description), el("p", {}, el("code", {}, e.formula)), figure,
     el("div", { class: "row" }, el("button", { type: "button", onclick: () => put(e.text) }, "Edit"), el("button", { type: "button", disabled: !!step, onclick: () => bench.act({ do: "forget", effect: e.id }) }, "Remove")));
 }
-/** The curve of an effect that is tried. */
+/** Draws the curve of an accepted effect. */
 async function shape(id, figure, step) {
   const key = `${id} ${step.story ? "fit" : "estimate"} ${bench.state.revision}`;
   try {
     if (!curves.has(key)) curves.set(key, await get(`/api/curve/${id}`));
     if (!figure.isConnected) return;
-    // a fit that refuses the effect has no curve of it: that of the estimate stays
+    // a fit that refuses the effect gives no curve of it, so the curve of the estimate stays
     const refused = step.story && !curves.get(key);
     const found = refused ? [...curves].findLast(([k, c]) => c && k.startsWith(`${id} estimate `))?.[1] : curves.get(key);
     const way = refused ? "equation error; the fit by output error refuses it" : step.story ? "output error" : "equation error";
@@ -134,7 +134,7 @@ async function shape(id, figure, step) {
   } catch (error) { complain(error.message); }
 }
 
-/** What a search for a formula found, with how far it may be trusted. */
+/** Shows the result of the search for a formula and its test. */
 function proposal() {
   const { state, proposal: found } = bench;
   const running = state.jobs.some((j) => j.work === "proposal");
@@ -144,19 +144,19 @@ function proposal() {
   const list = [el("div", { class: "row" }, ask), said];
   if (found) {
     const { effect, refused, sentences, front, free } = found;
-    // the sentences say how far it may be trusted, and what the test found
+    // the sentences state the result of the test and its reliability
     list.push(el("div", { class: `verdict ${effect ? "effect" : "unexplained"}` }, sentences.map((s) => el("p", {}, s)), refused.filter((s) => !sentences.includes(s)).map((s) => el("p", { class: "bad" }, s))));
     if (front.length) list.push(el("details", {}, el("summary", {}, "Formulas by size"), el("ul", {}, front.map((r) => el("li", {}, `${r.formula}: removes ${show(100 * r.removed)} %, evidence of its last term ${show(r.evidence)}, chance reaches ${show(r.threshold)}${r.chosen ? " (chosen)" : ""}`)))));
     if (free && free.front.length) list.push(el("details", {}, el("summary", {}, `Free forms, the best of each size (${free.tried} were tried)`), el("ul", {}, free.front.map((r) => el("li", {}, `${r.formula}: removes ${show(100 * r.removed)} %, evidence ${show(r.evidence)}, chance reaches ${show(r.threshold)}${r.chosen ? " (chosen)" : ""}`)))));
     if (effect) list.push(el("div", { class: "row" }, el("button", { type: "button", id: "proposal-edit", onclick: () => put(effect) }, "Open it as text")));
-    // as it comes, unless something is being written
+    // a result of this page's own search goes into the editor once
     if (effect && taken !== state.proposal.key && bench.waited_for === "proposal") { taken = state.proposal.key; put(effect); }
   }
   list.push(command(state.commands.propose, "Propose"));
   parts.proposal.replaceChildren(...list.filter(Boolean));
 }
 
-/** The schedules that tell two effects apart. */
+/** Lists the schedules that distinguish two effects. */
 function designed() {
   const { state } = bench;
   const said = state.schedule.error && el("p", { class: "bad" }, state.schedule.error);

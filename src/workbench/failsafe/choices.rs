@@ -38,7 +38,7 @@ pub(super) fn counterpart(counterpart: Counterpart) -> &'static str {
     }
 }
 
-/// Faults in the form, in order of decreasing frequency.
+/// Faults in the form, the most common ones first.
 pub(super) const FAULTS: [FaultKind; 18] = [
     FaultKind::Unplug,
     FaultKind::Corruption,

@@ -24,7 +24,8 @@ const SHARE_RAD: f64 = 0.349;
 const ALIKE: f64 = 0.01;
 /// Smallest moment of a candidate, as a fraction of the largest about the same axis.
 const LEAST: f64 = 0.05;
-/// Smallest moment about an axis, as a fraction of the largest about any axis; a smaller one is attributed to rounding.
+/// Smallest moment about an axis, as a fraction of the largest about any axis; a smaller moment is attributed to
+/// rounding.
 const LEAST_OF_ALL: f64 = 1e-3;
 
 /// A control and its axis: 0 roll, 1 pitch, 2 yaw.
@@ -138,7 +139,7 @@ fn score(parts: &[(&Tried, f64)], role: &Role, largest: f64) -> f64 {
     (own / (own + beside)).powi(2) * (own / largest).min(2.0).sqrt() * words * others * moves
 }
 
-/// Whether two names are those of the left and the right side.
+/// Whether two names denote the left and the right side of one control.
 fn are_sides(a: &str, b: &str) -> bool {
     let swapped = a.replace("left", "right") == b.replace("left", "right") && a != b;
     let differ: Vec<(char, char)> = a.chars().zip(b.chars()).filter(|(x, y)| x != y).collect();
@@ -148,9 +149,10 @@ fn are_sides(a: &str, b: &str) -> bool {
     swapped || (a.len() == b.len() && differ.len() == 1 && letters)
 }
 
-/// The positions that a command moves most, all by the same amount, in rad; if there are none in rad, the normalised
-/// ones. There may be two: on a V-tail, the elevator moves both surfaces the same way and the rudder moves them
-/// opposite ways. The mean of both positions, with their signs, is then the position of the control.
+/// The position that a command moves most, and all positions that it moves by the same amount. Normalised positions
+/// count only if no position in rad moves. There may be two: on a V-tail, the elevator moves both surfaces the same way
+/// and the rudder moves them opposite ways. The mean of both positions, with their signs, is then the position of the
+/// control.
 fn positions(tried: &Tried) -> Vec<&(String, [f64; 2])> {
     let kind = |name: &str| match name {
         _ if name.contains("deg") => 0,

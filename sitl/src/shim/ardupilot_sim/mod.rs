@@ -276,7 +276,7 @@ impl Run<'_> {
         Ok(last.map(|_| Over::Duration))
     }
 
-    /// The commands of a packet; a channel that ArduPilot does not send counts as without pulse.
+    /// The commands of a packet. A channel that ArduPilot does not send counts as a channel without a pulse.
     fn inputs(&mut self, packet: &ServoPacket) -> Inputs {
         let ranges = &self.ardupilot.ranges;
         let command =

@@ -721,8 +721,8 @@ messages! {
         time_usec: u64,
         /// Number of valid elements of `actuator`.
         active: u32,
-        /// Aileron, elevator, throttle positions; aileron and elevator rates, 1/s; then, other than
-        /// for the X8, the travel in rad. Positions and rates are normalised by the largest
+        /// Aileron, elevator, throttle positions; aileron and elevator rates, 1/s; then, for aircraft
+        /// other than the X8, the travels in rad. Positions and rates are normalised by the largest
         /// deflection; PROTOCOL.md lists the elements.
         actuator: [f32; 32],
     }

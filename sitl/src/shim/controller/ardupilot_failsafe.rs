@@ -13,7 +13,7 @@ const LOOK_EVERY: u64 = 33;
 /// Largest age of the ground station's heartbeat that ends the ground-station failure, s (FS_SHORT_TIMEOUT).
 const BACK_S: f64 = 1.5;
 
-/// Active failures.
+/// The active failure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum Failed {
     #[default]
@@ -33,9 +33,9 @@ pub(super) struct Seen {
     pub(super) steps: u64,
     pub(super) now_us: u64,
     pub(super) mode: Mode,
-    /// Whether a radio is bound.
+    /// Whether an RC transmitter is bound.
     pub(super) radio: bool,
-    /// Age of the last overrides and of the ground station's last heartbeat, s; `None` before the first.
+    /// Age of the last overrides, and of the ground station's last heartbeat, s; `None` if there was none.
     pub(super) sticks_s: Option<f64>,
     pub(super) station_s: Option<f64>,
 }

@@ -27,7 +27,8 @@ impl Lag {
         measured
     }
 
-    /// The inputs of `delay_ms`, ms, ago; the delay is rounded to whole steps. Before that, the first inputs.
+    /// Returns the inputs of the call `delay_ms` (ms, rounded to whole steps) ago. If there were fewer calls, returns
+    /// the inputs of the first call.
     pub(super) fn delayed(&mut self, inputs: Inputs, delay_ms: f64) -> Inputs {
         // NaN, for a stack without this parameter, becomes 0
         let steps = ((delay_ms * 1e-3 / DT_S).round().max(0.0) as usize).min(LONGEST);

@@ -198,7 +198,7 @@ impl Law {
         let climb = -seen.velocity_ned_mps[2];
         let [by_error, by_climb, most] = ALTITUDE;
         let pitch = by_error * (altitude - seen.altitude_m) - by_climb * climb;
-        // Added to 0.015 rad, the pitch of level flight at cruise airspeed.
+        // 0.015 rad is the pitch of level flight at cruise airspeed.
         self.attitude(seen, 0.0, 0.015 + pitch.clamp(-most, most), None)
     }
 }

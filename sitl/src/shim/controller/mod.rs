@@ -47,7 +47,7 @@ const LOOK_EVERY: u64 = 10;
 /// Least time from the first stick message until PX4's commander allows MANUAL, s, because another module forwards the sticks.
 /// Real PX4 refused MANUAL 150 ms after the first stick message in two of three requests, and never after 300 ms.
 const STICKS_SEEN_S: f64 = 0.15;
-/// Pulse widths of roll, pitch and throttle from a radio with released sticks and idle throttle, µs.
+/// Pulse widths of roll, pitch and throttle from an RC transmitter with released sticks and idle throttle, µs.
 const RADIO_US: [u16; 3] = [1500, 1500, 1000];
 /// Sensor bit MAV_SYS_STATUS_SENSOR_RC_RECEIVER.
 const RECEIVER: u32 = 1 << 16;
@@ -228,7 +228,7 @@ impl FlightController {
         self.parser.restart();
     }
 
-    /// Makes one step with the messages received so far.
+    /// Makes one step with the messages received so far. Returns why the flight is over; `None` if it continues.
     ///
     /// # Errors
     /// If the plant cannot be stepped, or the truth file cannot be written.
@@ -358,7 +358,7 @@ impl FlightController {
         {
             self.refuse_file(frame, &m);
         } else if self.mission(frame) {
-            // Answered.
+            // `mission` has answered the frame.
         } else if let Some(m) = frame.decode::<TimeSync>().filter(|m| m.tc1 == 0) {
             let tc1 = (self.now_us as i64).saturating_mul(1000);
             self.encoder.encode(&TimeSync { tc1, ..m }, &mut self.waiting);
@@ -563,14 +563,15 @@ impl FlightController {
         }
     }
 
-    /// Whether ArduPilot treats the sticks as released: RC_FS_TIMEOUT has passed without an override and no radio is bound.
+    /// Whether ArduPilot treats the sticks as released: RC_FS_TIMEOUT has passed without an override, and no RC
+    /// transmitter is bound.
     fn sticks_end(&self) -> bool {
         let patience = self.parameters.get("RC_FS_TIMEOUT");
         let ended = self.sticks.age_s(self.now_us).is_some_and(|age| age > patience);
         self.personality == Personality::Ardupilot && !self.has_radio() && ended
     }
 
-    /// Whether a radio is bound; its sticks are released and its throttle is closed.
+    /// Whether an RC transmitter is bound. Its sticks are released and its throttle is closed.
     fn has_radio(&self) -> bool {
         self.parameters.get("SIM_RC_FAIL") == 0.0
     }

@@ -26,7 +26,8 @@ const PX4: [(&str, f64, u8); 14] = [
     ("IMU_GYRO_CUTOFF", 40.0, REAL),
 ];
 
-/// Name, value and type of ArduPilot's parameters, with the calibration of a radio whose pitch channel is reversed.
+/// Name, value and type of ArduPilot's parameters, with the calibration of an RC transmitter whose pitch channel is
+/// reversed.
 const ARDUPILOT: [(&str, f64, u8); 41] = [
     ("SERVO1_REVERSED", 0.0, INT),
     ("SERVO2_REVERSED", 0.0, INT),
@@ -43,7 +44,7 @@ const ARDUPILOT: [(&str, f64, u8); 41] = [
     ("FS_LONG_TIMEOUT", 2.0, REAL),
     ("MAV_GCS_SYSID_HI", 0.0, INT),
     ("RC_OPTIONS", 32.0, INT),
-    // Parameter of ArduPilot's simulator: 1 for no radio, 0 for a radio with released sticks.
+    // Parameter of ArduPilot's simulator: 1 for no RC transmitter, 0 for an RC transmitter with released sticks.
     ("SIM_RC_FAIL", 1.0, INT),
     // Cutoff of the gyro low-pass, Hz (0 for no filter). SIM_SERVO_DELAY is the delay from command to surface, ms.
     ("INS_GYRO_FILTER", 20.0, INT),

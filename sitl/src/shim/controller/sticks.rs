@@ -33,8 +33,8 @@ impl Sticks {
         self.since.map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
     }
 
-    /// Stores an override. The value 0 in one of the first three channels releases all three to the radio. The value
-    /// 65535 leaves a channel unchanged.
+    /// Stores an override. The value 0 in one of the first three channels releases all three to the RC transmitter. The
+    /// value 65535 leaves a channel unchanged.
     pub(super) fn override_channels(&mut self, now_us: u64, m: &RcChannelsOverride) {
         let [one, two, three, ..] = m.channel;
         let sent = [one, two, three];
@@ -94,7 +94,8 @@ pub(super) fn released() -> Inputs {
     Inputs { aileron: 0.0, elevator: 0.0, throttle: 0.0, rudder: 0.0 }
 }
 
-/// ArduPilot's commands from channels by their calibration: angles in steps of 1/4500 of full travel, throttle in whole percent.
+/// Converts the pulse widths of ArduPilot's channels to commands by the channels' calibration: angles in steps of
+/// 1/4500 of full travel, throttle in whole percent.
 pub(super) fn ardupilot(pulses: [u16; 3], parameters: &Table) -> Inputs {
     let read = |channel: usize, name: &str| parameters.get(&format!("RC{channel}_{name}"));
     let angle = |channel: usize| {

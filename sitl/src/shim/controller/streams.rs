@@ -26,7 +26,7 @@ struct Row {
 pub(super) struct Equipment {
     /// Travel of the surfaces.
     pub travel: Travel,
-    /// MAV_SYS_STATUS_SENSOR bits of the RC receiver; 0 if no radio is bound.
+    /// MAV_SYS_STATUS_SENSOR bits of the RC receiver; 0 if no RC transmitter is bound.
     pub receiver: u32,
 }
 

@@ -15,15 +15,15 @@ use serial::SerialLink;
 use tcp::TcpLink;
 use udp::UdpLink;
 
-/// Longest wait of a patient receive. The kernel rounds it up to its tick, some milliseconds.
+/// Longest wait of a patient receive. The kernel rounds it up to a multiple of its tick, some milliseconds.
 const PATIENCE: Duration = Duration::from_millis(10);
 
 /// Whether `receive` waits for data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wait {
-    /// Waits for about 10 ms, for lockstep, in which nothing else is due meanwhile.
+    /// Waits for about 10 ms. Used in lockstep, where nothing else is due in that time.
     Patient,
-    /// Does not wait, for real time, in which a wait would delay the next frame.
+    /// Does not wait. Used in real time, where a wait would delay the next frame.
     Never,
 }
 
@@ -94,13 +94,13 @@ impl LinkError {
 /// Received data, or a change of the link itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arrival<'a> {
-    /// Nothing arrived, within the wait if there is one.
+    /// Nothing arrived, or nothing within the wait if there is one.
     Nothing,
     /// One datagram from this sender.
     Datagram(&'a [u8], SocketAddr),
     /// Some bytes of the stream.
     Bytes(&'a [u8]),
-    /// A stream has been set up.
+    /// A stream from this peer has been set up.
     Connected(SocketAddr),
     /// The stream has ended.
     Closed,

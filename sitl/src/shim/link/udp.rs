@@ -52,7 +52,8 @@ impl UdpLink {
     }
 
     pub(super) fn send(&mut self, bytes: &[u8]) -> bool {
-        // The kernel reports the refusal of an earlier datagram at this call, so the datagram is sent again.
+        // The kernel may report the refusal of an earlier datagram at this call. The present datagram is then sent
+        // again.
         let mut sent = self.try_send(bytes);
         if sent.as_ref().is_err_and(|error| error.kind() == io::ErrorKind::ConnectionRefused) {
             sent = self.try_send(bytes);

@@ -8,8 +8,8 @@ pub enum Clock {
     /// No message has arrived yet.
     #[default]
     Unknown,
-    /// The clock is behind simulated time by this offset, µs. The offset is 0, or the time of the first HIL_SENSOR that PX4
-    /// received and from which it counts.
+    /// The clock is behind simulated time by this offset, µs. The offset is 0, or the time of the first HIL_SENSOR that
+    /// PX4 received, from which PX4 counts its time.
     Behind(u64),
     /// An unrelated clock; each message then counts as an answer to the latest step, as in Gazebo's plugin.
     Foreign,
@@ -30,8 +30,8 @@ impl Clock {
     /// Finds the step that a message with the time stamp `time_us` answers. Steps were sent from `begun_us`, which is at least
     /// [`FIRST_US`], to `shown_us`; all times are in µs.
     ///
-    /// Simulated time begins at [`FIRST_US`]. An offset of 0 and an offset of `begun_us` are therefore distinguishable until the
-    /// same time has passed again.
+    /// Simulated time begins at [`FIRST_US`]. An offset of 0 and an offset of `begun_us` are therefore distinguishable
+    /// while the message's time stamp is below [`FIRST_US`].
     pub fn judge(&mut self, time_us: u64, begun_us: u64, shown_us: u64) -> Answers {
         if *self == Clock::Unknown {
             *self = Clock::of(time_us, begun_us, shown_us);

@@ -1,11 +1,11 @@
-//! The recipe of a training, from the options of the command.
+//! The recipe (all settings) of a training, from the options of the command.
 
 use super::{Arguments, Joint};
 use crate::learn::{Criterion, Recipe, Start, trainable};
 use crate::model::{GreyBox, STEP};
 
-/// Steps of a rollout on logs that are sampled more slowly than the model steps. These logs are interpolated between
-/// their samples. Short rollouts would learn the interpolation.
+/// Steps of a rollout on logs whose sample time exceeds the model's time step. These logs are interpolated between their
+/// samples, and short rollouts would learn the interpolation.
 const SLOW_STEPS: usize = 200;
 
 impl Arguments {

@@ -1,4 +1,4 @@
-//! The recipes of a training, from the options of the command.
+//! The recipes (all settings) of a training, from the options of the command.
 
 use super::{Arguments, Place};
 use crate::learn::{AnalyticRecipe, Hyperparameters, PolicyRecipe, ValuationRecipe};

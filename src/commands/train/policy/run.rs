@@ -81,7 +81,7 @@ impl Run<'_> {
     }
 
     pub(super) fn train<W: World>(&self, recipe: PolicyRecipe, world: W) -> Result<bool> {
-        // The number of steps is not part of the identity. A training can then be continued with more steps.
+        // The number of steps is not part of the identity, so that a training can be continued with more steps.
         let of = PolicyRecipe { steps: 0, ..recipe.clone() };
         let of = (of, &self.ground.origin.model_sha256);
         let what = serde_json::to_string(&of)?;
@@ -182,7 +182,7 @@ fn warn(seed: u64, progress: &PolicyProgress) {
     }
 }
 
-/// A point of the curve with the evaluation only.
+/// A point of the learning curve that has only the results of the evaluation `e`.
 pub fn reached(e: Evaluated) -> CurvePoint {
     let Evaluated { easy_deg, hard_deg, divergence_rate, .. } = e;
     CurvePoint { easy_deg, hard_deg, divergence_rate, ..CurvePoint::default() }

@@ -24,7 +24,7 @@ impl Answers {
     ///
     /// If the model has no straight-flight trim at `airspeed`.
     pub fn of(model: &GreyBox, airspeed: f64) -> Result<Answers, TrimError> {
-        // a change of altitude by 1000 m changes a response by a tenth
+        // one altitude suffices: a change of altitude by 1000 m changes a response by a tenth
         let altitude = model.airframe.reference.altitude;
         let trim = Trim::straight(model, airspeed, altitude)?;
         let command = model.airframe.actuators.command(&trim.controls);
@@ -74,7 +74,7 @@ mod tests {
         // a command appears in the surfaces of the next state, and in the rates of the state after that
         assert_eq!([answers.after(0, -1), answers.after(0, 0), answers.after(0, 1)], [0.0; 3]);
         // Steady roll: Clδa δa · 2 V / (b |Clp|) = 0.1202 · 0.5235 · 40 / (2.1 · 0.4042) = 2.97 rad/s. Sideslip, the
-        // product of inertia and the yaw rate reduce it by half.
+        // product of inertia and the yaw rate reduce it to about half.
         let roll = answers.after(0, 20);
         assert!(roll > 1.0 && roll < 3.0, "{roll}");
         // q̇ = ½ρV² S c Cmδe δe / Jy = −43 rad/s² at first. After two states q is −0.9 rad/s.

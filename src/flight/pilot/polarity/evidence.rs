@@ -1,4 +1,4 @@
-//! Evidence on surface signs: recorded rates and commands, and the regression on modelled responses.
+//! Data of the polarity check: recorded rates and commands, and their regression on modelled responses.
 
 use std::ops::RangeInclusive;
 
@@ -7,14 +7,15 @@ use nalgebra::{Matrix3, Vector3};
 use super::LONGEST;
 use super::answers::Answers;
 
-/// Largest additional delay of link and controller relative to the simulator, state frames of 10 ms.
+/// Largest delay of link and flight controller that is tried on top of the modelled response, state frames of 10 ms.
 const LATENESS: isize = 9;
-/// Smallest number of rate changes with which a regression is made.
+/// Smallest number of rate changes for a regression.
 const LEAST: usize = 14;
 /// Upper limit of the lag-one autocorrelation of the regression residuals.
 const MAX_AUTOCORRELATION: f64 = 0.9;
-/// Possible leads of the handover of control authority relative to the first state of the check, state frames. The
-/// notice of the handover shares the link with the states, and the controller samples its channels at its own time.
+/// Handover times of control authority that are tried, in state frames before the first state of the check. The exact
+/// time is unknown: the notice of the handover shares the link with the states, and the flight controller samples its
+/// channels at its own times.
 const TAKEN: RangeInclusive<isize> = -1..=2;
 
 /// Estimated gain on the modelled response, with its standard error.
@@ -35,7 +36,7 @@ impl Fit {
     }
 }
 
-/// Record of a sign check, one entry per state frame of 10 ms from the start of the check.
+/// Record of a polarity check, one entry per state frame of 10 ms from the start of the check.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Evidence {
     /// Roll and pitch rate, rad/s; `None` for a lost state.
@@ -74,7 +75,8 @@ impl Evidence {
         both.min_by(|a, b| misfit(a).total_cmp(&misfit(b)))
     }
 
-    /// Modelled change of the rate of `axis` from each state to the next.
+    /// Modelled change of the rate of `axis` from each state to the next, rad/s, if commands act `late` state frames
+    /// late.
     fn answered(&self, answers: &Answers, axis: usize, late: isize) -> Vec<f64> {
         let at = |state: isize| -> f64 {
             let terms = self.changes[axis].iter();
@@ -84,10 +86,10 @@ impl Evidence {
         states.windows(2).map(|pair| pair[1] - pair[0]).collect()
     }
 
-    /// Least squares on the changes of the rate between states. Gusts are a random walk, so their changes are nearly
-    /// white. The standard error is increased by the remaining autocorrelation. There are three regressors: the
-    /// modelled response to the commands, the response to a step of unknown size at the handover, `taken` states before
-    /// the first, and a constant.
+    /// Least squares on the changes of the rate between states. The disturbance of the rates by gusts resembles a
+    /// random walk, so its changes are nearly white. The standard error is corrected for the remaining autocorrelation.
+    /// There are three regressors: the modelled response to the commands, the response to a step of unknown size at the
+    /// handover, `taken` states before the first, and a constant.
     fn axis(&self, answers: &Answers, axis: usize, answered: &[f64], taken: isize) -> Option<Fit> {
         let to_step = |state: isize| answers.after(axis, state + taken);
         let rows = || {
@@ -149,7 +151,7 @@ mod tests {
             (fit(-0.9, 8.0), right, SEEN[0], reversed(Axis::Roll)),
             (fit(-0.9, 8.0), right, SEEN[0] - 1, Verdict::Open),
             (right, fit(-0.9, 8.0), SEEN[1], reversed(Axis::Pitch)),
-            // Large but not certain; certain but too small for a response.
+            // A gain that is large but not certain, then gains that are certain but too small for a response.
             (fit(-0.9, 6.9), right, SEEN[1], Verdict::Open),
             (fit(-0.09, 50.0), right, SEEN[1], Verdict::Open),
             (right, fit(0.09, 50.0), LONGEST - 1, Verdict::Open),
@@ -161,7 +163,7 @@ mod tests {
     #[test]
     fn what_is_not_certain_in_the_end_is_no_answer_or_too_much_air() {
         let right = fit(0.9, 8.0);
-        // 0.2 + 3 · 0.09 is less than half of the modelled response, 0.6 + 3 · 0.3 is not.
+        // By three standard errors, a gain of 0.2 ± 0.09 is below half of the modelled response, and 0.6 ± 0.3 is not.
         for (roll, pitch, fault) in [
             (fit(0.2, 2.2), right, Fault::Unanswered(Axis::Roll)),
             (right, fit(0.2, 2.2), Fault::Unanswered(Axis::Pitch)),
@@ -176,8 +178,8 @@ mod tests {
         }
     }
 
-    /// The record of an aircraft that responds as the model does. `leftover` (rad/s) is added to its rates at each
-    /// state frame.
+    /// The record of an aircraft that responds as the model does. Both rates also contain a disturbance, which changes
+    /// by `leftover` (rad/s) at each state frame.
     fn record(answers: &Answers, states: usize, leftover: impl Fn(usize) -> f64) -> Evidence {
         let mut evidence = Evidence::default();
         let changes = [[(0, 0.06), (12, -0.12)], [(6, 0.06), (18, -0.12)]];

@@ -1,4 +1,4 @@
-//! The check of surface signs: does the aircraft respond to the surfaces as the model predicts?
+//! The polarity check of the surfaces: does the aircraft respond to them with the signs that the model predicts?
 //!
 //! A flight controller can fly well with its own loops although the channel order, a reversal or a mixer between the
 //! companion's commands and the surfaces is wrong. When control authority is given, the companion therefore first
@@ -15,7 +15,8 @@ use evidence::{Evidence, Fit};
 use greylag_link::vehicle::{Axis, Fault};
 use greylag_physics::{Command, State, Time};
 
-/// Pulse amplitudes of the rounds, normalised deflection: 0.06 is 1.9° for the X8 and causes a roll rate of 9 °/s.
+/// Pulse amplitude of each round as a fraction of full deflection. For the X8, 0.06 is 1.9° and causes a roll rate of
+/// 9 °/s.
 const PULSES: [f64; 3] = [0.06, 0.1, 0.15];
 /// Signs of a round's pulses, each [`LENGTH`] state frames long. Their effects on the attitude cancel.
 const PATTERN: [f64; 4] = [1.0, -1.0, -1.0, 1.0];
@@ -50,7 +51,7 @@ pub(super) enum Verdict {
     Wrong(Fault),
 }
 
-/// Start of a check.
+/// Time, attitude and command at the first state of a check.
 #[derive(Clone, Copy, Debug)]
 struct Begun {
     at: Time,
@@ -67,7 +68,7 @@ enum Stage {
     Rest,
     /// Control authority is demanded and not yet given.
     Waiting,
-    /// Control authority was given. The first state after that may still be outstanding.
+    /// Control authority was given. `begun` is `None` until the first state after that.
     Running { begun: Option<Begun>, evidence: Evidence, last: Command },
 }
 
@@ -131,8 +132,8 @@ impl Check {
         verdict
     }
 
-    /// The command in reply to the state of `now` during the check: level trim with pulses; `None` before the first
-    /// state.
+    /// The command in reply to the state of vehicle time `now`: level trim with pulses. `None` before the first state
+    /// and while no check is running.
     pub(super) fn command(&self, now: Time) -> Option<Command> {
         let Stage::Running { begun: Some(begun), .. } = &self.stage else { return None };
         let index = begun.index(now) as isize;
@@ -143,7 +144,7 @@ impl Check {
         })
     }
 
-    /// Records the command that was sent in reply to the state of `now`.
+    /// Records the command that was sent in reply to the state of vehicle time `now`.
     pub(super) fn commanded(&mut self, now: Time, command: Command) {
         let Stage::Running { begun: Some(begun), evidence, last } = &mut self.stage else { return };
         let index = begun.index(now);
@@ -160,7 +161,7 @@ impl Begun {
     }
 }
 
-/// The pulse at state frame `index`, counted from the start of the surface's pulses, normalised deflection.
+/// The pulse at state frame `index`, counted from the start of the surface's pulses, as a fraction of full deflection.
 fn pulse(index: isize) -> f64 {
     let Ok(index) = usize::try_from(index) else { return 0.0 };
     let (round, within) = (index / ROUND, index % ROUND);
@@ -203,13 +204,13 @@ mod tests {
     use std::collections::VecDeque;
     use std::path::Path;
 
-    /// Verdict on the model itself, and the number of state frames it took. Commands are delayed by `late` frames and
-    /// pass through `wired` to the surfaces.
+    /// Verdict of the check on a simulated flight of the model, and the number of state frames until the verdict.
+    /// Commands are delayed by `late` frames. `wired` maps commanded to actual aileron and elevator.
     fn verdict(late: usize, wired: impl Fn([f64; 2]) -> [f64; 2]) -> (Verdict, u64) {
         verdict_after(2, late, wired)
     }
 
-    /// The verdict when control authority was given `early` states before its notice arrives.
+    /// Like `verdict`, for control authority that was given `early` states before its notice arrives.
     fn verdict_after(
         early: usize,
         late: usize,
@@ -256,7 +257,8 @@ mod tests {
         for late in 0..=6 {
             let (verdict, states) = verdict(late, |surfaces| surfaces);
             let Verdict::Right(gains) = verdict else { panic!("{late}: {verdict:?}") };
-            // The modelled responses are for 22 m/s and the aircraft flies at 20 m/s, with 0.8 of the force.
+            // The modelled responses are for 22 m/s and the aircraft flies at 20 m/s, where the same deflection has 0.8
+            // times the force.
             assert!(gains.iter().all(|gain| (0.5..1.2).contains(gain)), "{late}: {gains:?}");
             assert!(states < ROUND as u64, "{late}: after {states}");
         }
@@ -267,7 +269,7 @@ mod tests {
         for late in [0, 3, 6] {
             let roll = verdict(late, |[aileron, elevator]| [-aileron, elevator]).0;
             assert_eq!(roll, Verdict::Wrong(Fault::Reversed(Axis::Roll)), "{late}");
-            // With the elevator reversed, the trim pitches the nose up before the first pulse, however early authority is given.
+            // A reversed trim elevator pitches the nose up before the first pulse, for any lead of the handover.
             for early in 0..=4 {
                 let (pitch, _) =
                     verdict_after(early, late, |[aileron, elevator]| [aileron, -elevator]);
@@ -332,7 +334,7 @@ mod tests {
                 let state = State { roll, pitch, ..State::NEUTRAL };
                 check.see(Time::from_micros(10_000 * k), &state, Command::IDLE)
             };
-            // In a turn, only a change of attitude by more than 20° ends the check.
+            // The check starts in a turn. Only a change of attitude by more than 20° ends it.
             assert_eq!(see(0, 35.0, 15.0), Verdict::Open);
             assert_eq!(see(1, roll_deg, pitch_deg) == Verdict::Open, open, "{roll_deg}");
         }

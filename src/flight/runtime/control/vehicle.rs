@@ -14,7 +14,8 @@ use greylag_link::transport::Arrival;
 use greylag_link::vehicle::{Notice, Order, Telemetry};
 use greylag_physics::Time;
 
-/// Largest number of states from one packet. A TCP chunk of 1024 bytes holds four. Of more states the newest is kept.
+/// Largest number of states from one packet. A TCP chunk of 1024 bytes holds four. If there are more, the last place
+/// holds the newest.
 const STATES_PER_PACKET: usize = 8;
 
 /// A state with the peer and the arrival time of the packet that completed it.
@@ -48,8 +49,8 @@ impl Control {
         self.take_notices();
     }
 
-    /// Handles arrivals until a state is live, for at most 50 ms. After a stall a full socket buffer holds the oldest
-    /// states.
+    /// Handles arrivals until a state is live, for at most 50 ms. A socket buffer that became full in a stall holds the
+    /// oldest states of the stall.
     fn catch_up(&mut self, mut newest: Option<Heard>, live: Time) -> Option<Heard> {
         let until = Instant::now() + CATCH_UP;
         while newest.is_none_or(|heard| heard.state.time < live) {

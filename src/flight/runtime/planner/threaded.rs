@@ -92,7 +92,7 @@ impl Threaded {
 impl Drop for Threaded {
     fn drop(&mut self) {
         self.requests = None;
-        // the thread may block on its last plan, which nobody fetches
+        // the thread may block on a plan that nobody has fetched
         while self.plans.recv().is_ok() {}
         if let Some(thread) = self.thread.take() {
             // a panic of the controller has been reported by its thread

@@ -1,4 +1,4 @@
-//! Rollouts in JSBSim's integration scheme: one model evaluation per step, with memory of the previous one.
+//! Rollouts in JSBSim's integration scheme: one model evaluation per step, and a memory of the previous step.
 
 use crate::dynamics::kernel::InstructionSet;
 use crate::dynamics::packet::Packet;
@@ -70,8 +70,8 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         }
     }
 
-    /// Backpropagates through one step of JSBSim's scheme: from the gradients of the next state (`after`) and of the memory
-    /// (`remembered`) to those of the step's inputs.
+    /// Backpropagates through one step of JSBSim's scheme. `after` and `remembered` are the gradients with respect to
+    /// the next state and to the next memory. Returns the gradients with respect to the step's inputs.
     #[inline(always)]
     fn advance_back(
         &self,

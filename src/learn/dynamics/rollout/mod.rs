@@ -1,5 +1,5 @@
-//! A block of rollouts: a forward pass with a trace, then a reverse pass for the slopes, eqs. (20) and (22) of
-//! \[GSFM26\].
+//! A block of rollouts: a forward pass that stores a trace, then a reverse pass for the gradient, eqs. (20) and (22)
+//! of \[GSFM26\].
 
 mod jsbsim;
 mod rk4;
@@ -16,7 +16,7 @@ use greylag_physics::effects::Needs;
 use greylag_physics::rigid_body::Vector;
 use greylag_physics::{Controls, State};
 
-/// Number of points whose weight gradients are summed together. Their data stays in the cache.
+/// Number of points whose weight gradients are summed together. Their data fits into the cache.
 const CHUNK: usize = 20;
 
 /// The model that is learned.
@@ -28,31 +28,32 @@ pub struct Subject {
     pub network: Passes,
     /// Input and output scales of the residual.
     pub scales: Scales,
-    /// Whether the slopes over the prior's coefficients are computed.
+    /// Whether the gradient with respect to the prior's coefficients is computed.
     pub prior_slopes: PriorSlopes,
 }
 
-/// Whether the prior's coefficients are trained.
+/// Whether the gradient with respect to the prior's coefficients is computed, because they are trained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PriorSlopes {
     /// The coefficients are frozen.
     None,
-    /// The slopes over all coefficients and over Jxz are computed.
+    /// The gradient with respect to all coefficients and to Jxz is computed.
     All,
 }
 
 /// Recorded data of `Packet::WIDTH` rollouts.
 #[derive(Clone, Debug, Default)]
 pub struct Recorded<R> {
-    /// States one step before the start, at the start, and after each step, with roll in −π..π.
+    /// States one step before the start, at the start, and after each step. Roll is in −π..π.
     pub states: Vec<[R; 8]>,
-    /// Effective aileron, elevator, throttle and rudder, from the step before the start on.
+    /// Acting aileron, elevator, throttle and rudder in each step, including the step before the start.
     pub controls: Vec<[R; 4]>,
-    /// Inputs of the formulas' lags and delays, from the step before the start on; empty for a model without lags.
+    /// Values of the formulas' `lag(…)` and `delay(…)` terms in each step, including the step before the start; empty
+    /// for a model without such terms.
     pub lagged: Vec<[R; LAGS]>,
-    /// Air density from the step before the start on, kg/m³.
+    /// Air density in each step, including the step before the start, kg/m³.
     pub density: Vec<R>,
-    /// Weight of each rollout; 0 for one that pads the block.
+    /// Weight of each rollout; 0 for a rollout that only fills the block.
     pub weight: Option<R>,
 }
 
@@ -64,22 +65,22 @@ pub struct Trace<R> {
     states: Vec<State<R>>,
     /// The network's activations at each of these states.
     units: Vec<R>,
-    /// F_p and F_a at the start of each step.
+    /// State rates F_p of the prior and F_a of the residual at the start of each step.
     rates: Vec<[State<R>; 2]>,
     /// The states after each step.
     ends: Vec<State<R>>,
     /// The acceleration in each step, and the integrator's memory before the step.
     memory: Vec<[Vector<R>; 2]>,
-    /// The network's slopes of a chunk of points.
+    /// The network's gradients with respect to the pre-activations, for a chunk of points.
     slopes: Vec<R>,
-    /// Sums over points of the slopes over the coefficients.
+    /// Sums over points of the gradient with respect to the coefficients.
     coefficients: Vec<R>,
 }
 
 /// Results of a forward pass, summed over the rollouts with their weights.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
-    /// Σ over steps of ‖(ŝ − s)/x_c‖².
+    /// Σ over steps of ‖(ŝ − s)/x_c‖², with the predicted state ŝ and the recorded state s.
     pub error: f64,
     /// Σ over steps of ‖F_p/x_c‖².
     pub prior: f64,
@@ -87,19 +88,19 @@ pub struct Sums {
     pub learned: f64,
 }
 
-/// Slopes of the objective over the three [`Sums`].
+/// Derivatives of the objective with respect to the three [`Sums`].
 pub type SumSlopes = Sums;
 
-/// Slopes of the objective over the trained parameters.
+/// Gradient of the objective with respect to the trained parameters.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Gradient {
-    /// Slopes over the network's parameters.
+    /// Gradient with respect to the network's parameters.
     pub network: Vec<f64>,
-    /// Slopes over the prior's coefficients, then Jxz (kg m²).
+    /// Gradient with respect to the prior's coefficients, then Jxz (kg m²).
     pub prior: Vec<f64>,
 }
 
-/// Model evaluations per step.
+/// Number of model evaluations per step.
 const fn stages(integrator: Integrator) -> usize {
     match integrator {
         Integrator::Rk4 => 4,
@@ -134,9 +135,9 @@ fn sum<R: Real>(a: &State<R>, b: &State<R>) -> State<R> {
     a.advance(b, 1.0)
 }
 
-/// A pass over one block.
+/// A forward or reverse pass over one block.
 pub struct Pass<'a, S: InstructionSet> {
-    /// The instruction set it is compiled for.
+    /// The instruction set for which the pass is compiled.
     pub set: S,
     /// The model under training.
     pub subject: &'a Subject,
@@ -151,7 +152,8 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         self.recorded.controls.len() - 1
     }
 
-    /// Integrates the block. Returns the sums, and a value per lane that is finite if the lane's path is finite.
+    /// Integrates the block. Returns the sums, and one value per lane that is finite only if the lane's path is
+    /// finite.
     #[inline(always)]
     pub fn forward(&self, trace: &mut Trace<R>) -> (Sums, R) {
         let totals = match self.subject.prior.integrator {
@@ -162,8 +164,8 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         (Sums { error, prior, learned }, totals[0] + totals[1] + totals[2])
     }
 
-    /// Adds the slopes of the objective over the trained parameters to `gradient`. `of` are the slopes over the sums of
-    /// the forward pass.
+    /// Adds the gradient of the objective with respect to the trained parameters to `gradient`. `of` holds the
+    /// derivatives of the objective with respect to the sums of the forward pass.
     #[inline(always)]
     pub fn reverse(&self, trace: &mut Trace<R>, of: &SumSlopes, gradient: &mut Gradient) {
         trace.coefficients.fill(R::zero());
@@ -199,7 +201,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         }
     }
 
-    /// F_a at a point.
+    /// State rates F_a of the residual at a point.
     #[inline(always)]
     fn learned(&self, at: &At<R>, point: usize, trace: &mut Trace<R>) -> State<R> {
         let Subject { network, scales, .. } = self.subject;
@@ -209,7 +211,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         scales.rate(network.forward(scales.inputs(&at.state, &at.controls), units))
     }
 
-    /// x/x_c² and ‖x/x_c‖², weighted by rollout.
+    /// x/x_c² and ‖x/x_c‖², multiplied by the weight of the rollout.
     #[inline(always)]
     fn weighted(&self, x: [R; 8]) -> ([R; 8], R) {
         let weight = self.recorded.weight.unwrap_or(R::from_f64(1.0));
@@ -223,7 +225,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         (half_slope, square)
     }
 
-    /// Weighted ŝ − s after `step`, with the roll error wrapped to −π..π.
+    /// The difference ŝ − s after `step`, weighted by `weighted`, with the roll error wrapped to −π..π.
     #[inline(always)]
     fn error(&self, step: usize, predicted: &State<R>) -> ([R; 8], R) {
         use std::f64::consts::{PI, TAU};
@@ -237,7 +239,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         self.weighted(error)
     }
 
-    /// Adds a step's error and norms.
+    /// Adds a step's error and norms to `totals`.
     #[inline(always)]
     fn tally(&self, step: usize, trace: &Trace<R>, totals: &mut [R; 3]) {
         let [prior, learned] = &trace.rates[step];
@@ -246,7 +248,8 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         totals[2] += self.weighted(learned.to_array()).1;
     }
 
-    /// Slopes of the step's part of the sums over the state after it, over F_p and over F_a.
+    /// Derivatives of the objective through this step's part of the sums, with respect to the state after the step,
+    /// to F_p and to F_a.
     #[inline(always)]
     fn direct(&self, step: usize, trace: &Trace<R>, of: &SumSlopes) -> [State<R>; 3] {
         let [prior, learned] = &trace.rates[step];
@@ -260,8 +263,8 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         ]
     }
 
-    /// Backpropagates through prior and residual at a point. Returns the slopes over the state there, and adds the
-    /// slopes over the trained parameters. Points must come in descending order.
+    /// Backpropagates through prior and residual at a point. Returns the gradient with respect to the state there,
+    /// and adds the gradient with respect to the trained parameters. Points must come in descending order.
     #[inline(always)]
     fn point(
         &self,
@@ -312,10 +315,10 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
 /// A point of a rollout.
 #[derive(Clone, Copy)]
 struct Place {
-    /// Step of the point.
+    /// Step to which the point belongs.
     step: usize,
-    /// Number of the point.
+    /// Index of the point in the trace.
     point: usize,
-    /// The number of the first point of the rollout.
+    /// Index of the first point of the rollout in the trace.
     first: usize,
 }

@@ -7,9 +7,10 @@ use crate::dynamics::rollout::{Gradient, Pass, Place, SumSlopes, Trace, nothing,
 use greylag_model::STEP;
 use greylag_physics::State;
 
-/// Weights of the four slopes, s.
+/// Weights of the state rates of the four stages, s.
 const WEIGHTS: [f64; 4] = [STEP / 6.0, STEP / 3.0, STEP / 3.0, STEP / 6.0];
-/// Time of each stage's state along the previous slope, s.
+/// Time from the start of the step to each stage, s. The state of a stage is extrapolated with the rates of the
+/// previous stage.
 const AHEAD: [f64; 4] = [0.0, STEP / 2.0, STEP / 2.0, STEP];
 
 impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
@@ -43,13 +44,13 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         of: &SumSlopes,
         gradient: &mut Gradient,
     ) {
-        // the slope with respect to the state after the step
+        // the gradient with respect to the state after the step
         let mut slope = nothing();
         for step in (1..=self.steps()).rev() {
             let [error, norm_prior, norm_learned] = self.direct(step, trace, of);
             slope = sum(&slope, &error);
             let mut before = slope;
-            // slope over the state at which the stage after this one was evaluated
+            // the gradient with respect to the state at which the following stage was evaluated
             let mut later = nothing();
             for stage in (0..4).rev() {
                 let ahead = AHEAD.get(stage + 1).copied().unwrap_or(0.0);

@@ -53,11 +53,11 @@ pub struct Progress {
     pub update: u64,
     /// Length of the rollouts, steps of 10 ms.
     pub steps: usize,
-    /// Loss, mean over the updates since the last report. `lost` is the sum over these updates.
+    /// Mean loss over the updates since the last report. `lost` is the sum over these updates.
     pub loss: Loss,
-    /// L_pred/L_prior, eq. (23), mean over the updates since the last report.
+    /// Mean of L_pred/L_prior, eq. (23), over the updates since the last report.
     pub normalised: f64,
-    /// Penalty weight λ of eq. (24).
+    /// λ of eq. (24): the penalty on the residual is divided by it.
     pub lambda: f64,
 }
 
@@ -70,7 +70,7 @@ pub struct Moment {
     pub normalised: f64,
     /// Residual ratio ‖F_a‖/‖F_p‖, eq. (22).
     pub ratio: f64,
-    /// Penalty weight λ of eq. (24).
+    /// λ of eq. (24): the penalty on the residual is divided by it.
     pub lambda: f64,
     /// The trained coefficients, in the order of [`Trainer::coefficients`](super::Trainer::coefficients).
     pub coefficients: Vec<f64>,

@@ -23,13 +23,14 @@ pub(super) struct Stage {
     /// Prediction loss of the bare prior, L_prior.
     pub(super) prior_error: f64,
     pub(super) all: Vec<Window>,
-    /// The epoch for which `order` was shuffled.
+    /// Number of the epoch for which `order` was shuffled.
     pass: u64,
     order: Vec<Window>,
 }
 
 impl Stage {
-    /// Collects the rollouts of `steps` steps, and computes the error of the bare prior, `bare`, on them.
+    /// Collects the rollouts of `steps` steps. `bare` is the model without a residual, whose error on them is
+    /// computed.
     pub(super) fn new(
         bare: &Subject,
         recipe: &Recipe,
@@ -58,7 +59,7 @@ impl Stage {
             return Err(TrainError::Prior(bare.prior.name.clone()));
         }
         let prior_error = match recipe.criterion {
-            // without any error of the prior the divisor would be zero
+            // if the prior had no error, the divisor would be zero
             Criterion::Scaled => loss.prediction.max(1e-12),
             Criterion::Plain => 1.0,
         };
@@ -85,7 +86,7 @@ fn weigh(all: &mut [Window], model: &GreyBox, tracks: &[Track], steps: usize, fl
     let mut weights: Vec<f64> =
         all.par_iter().map(|w| off_after(model, tracks, w, steps).powi(2)).collect();
     let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
-    // without any error of the prior the divisor would be zero
+    // if the prior had no error, the divisor would be zero
     let unit = mean(&weights).max(f64::MIN_POSITIVE);
     weights.iter_mut().for_each(|w| *w = 1.0 / (*w / unit + floor * floor));
     let unit = mean(&weights);

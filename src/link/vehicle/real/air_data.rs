@@ -9,28 +9,28 @@
 //! w' = q u - p v + g cos θ cos φ   + az
 //! ```
 //!
-//! Three measurements correct the state. The first is the airspeed |(u, v, w)|. The second is the climb rate, in air
-//! whose vertical velocity is zero in the mean. The third is a sideslip that is zero in the mean; if wind and velocity
-//! over ground are reported, the sideways velocity computed from them is used as well. The state is a velocity relative
-//! to the air, so a constant wind cancels. A steady updraught of 1 m/s causes an error of w/V in the angle of attack,
-//! 3° at 20 m/s.
+//! Three measurements correct the state. The first is the airspeed |(u, v, w)|. The second is the climb rate, with the
+//! assumption that the vertical velocity of the air is zero in the mean. The third is the assumption that the sideslip
+//! is zero in the mean. If wind and velocity over ground are reported, the sideways velocity computed from them is used
+//! as well. The state is a velocity relative to the air, so a constant wind cancels. A steady updraught does not
+//! cancel: 1 m/s causes an error of 3° in the angle of attack at 20 m/s.
 
 use greylag_physics::atmosphere::MIDDLE_GRAVITY;
 
-/// Process noise of the air-relative velocity (gusts, accelerometer noise), m/s². It is multiplied by the step of 10
-/// ms. Light turbulence changes the velocity of the air at about this rate.
+/// Process noise of the air-relative velocity (gusts, accelerometer noise), m/s². The standard deviation per step is
+/// this value times the step. Light turbulence changes the velocity of the air at about this rate.
 const PROCESS: f64 = 1.0;
 /// Standard deviation of the airspeed, m/s.
 const AIRSPEED: f64 = 0.5;
 /// Standard deviation of the climb rate as a measurement relative to the air, m/s.
 const CLIMB: f64 = 0.5;
-/// Standard deviation of the pseudo-measurement v = 0 at every step, m/s. Relative to the process noise it returns the
-/// sideslip to zero within a few seconds: drift is bounded, and turns remain visible.
+/// Standard deviation of the pseudo-measurement v = 0 at every step, m/s. With the process noise above, it returns the
+/// sideslip to zero within a few seconds. This bounds the drift, and sideslip in turns remains visible.
 const SIDEWAYS: f64 = 5.0;
-/// Standard deviations of the estimated angle of attack and sideslip, rad. With an exact attitude and in calm air they
-/// are 0.2° and 0.3° to 0.5° for real ArduPlane, 0.1° and 0.2° for real PX4 (`tests/firmware/angles.py`). Gusts add to
-/// them. A pitch error adds to the angle of attack, a heading error to the sideslip. 1° of pitch and 2° of heading are
-/// taken as two standard deviations: ArduPlane's attitude errors were 0.7° and 0.9°, and a compass may have a larger
+/// Standard deviations of the estimated angle of attack and sideslip without gusts, rad. With an exact attitude in calm
+/// air, α had 0.2° and β 0.3° to 0.5° with real ArduPlane, and 0.1° and 0.2° with real PX4
+/// (`tests/firmware/angles.py`). A pitch error adds to α, and a heading error adds to β. Two standard deviations are
+/// taken as 1° of pitch and 2° of heading: ArduPlane's errors were 0.7° and 0.9°, and a compass may have a larger
 /// error.
 pub const DEVIATION: [f64; 2] = [0.71 * DEGREE, 1.12 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
@@ -99,7 +99,7 @@ impl AirData {
         self.correct(m);
         let mut numbers = self.state.iter().flatten().chain(self.covariance.iter().flatten());
         if !numbers.all(|x| x.is_finite()) {
-            // otherwise no later measurement would give angles
+            // an estimate that is not finite would never recover
             *self = AirData::default();
         }
         let [u, v, w] = self.state?;
@@ -151,7 +151,8 @@ impl AirData {
         self.state.map_or(0.0, |x| row.iter().zip(x).map(|(a, b)| a * b).sum())
     }
 
-    /// Updates with one scalar measurement: its row, innovation and standard deviation (m/s).
+    /// Updates with one scalar measurement: its row of the measurement matrix, its innovation (m/s) and its standard
+    /// deviation (m/s).
     fn scalar(&mut self, row: [f64; 3], innovation: f64, deviation: f64) {
         let Some(state) = &mut self.state else { return };
         let p = self.covariance;
@@ -160,7 +161,7 @@ impl AirData {
             row.iter().zip(cross).map(|(a, b)| a * b).sum::<f64>() + deviation * deviation;
         // an outlier counts as three standard deviations at most
         let limit = 3.0 * spread.sqrt();
-        // a NaN limit must not panic in the clamp and does not limit
+        // not `clamp`, which would panic for a NaN limit
         let innovation = innovation.max(-limit).min(limit);
         for i in 0..3 {
             state[i] += cross[i] / spread * innovation;
@@ -264,7 +265,8 @@ mod tests {
         let yaw = 0.4 + turn * t;
         let ((sr, cr), (sp, cp), (sy, cy)) = (roll.sin_cos(), pitch.sin_cos(), yaw.sin_cos());
         let [p, q, r] = [-turn * sp, turn * sr * cp, turn * cr * cp];
-        // The velocity is constant in body axes. The specific force is its acceleration in the turn, less gravity.
+        // The velocity is constant in body axes, so the acceleration is that of the turn. The specific force is this
+        // acceleration less gravity.
         let specific_force = [
             q * w - r * v + MIDDLE_GRAVITY * sp,
             r * u - p * w - MIDDLE_GRAVITY * cp * sr,
@@ -290,9 +292,9 @@ mod tests {
 
     #[test]
     fn the_angles_of_a_climbing_turn_with_sideslip_are_found() {
-        // Every measurement is consistent with the motion, so the filter must find it with any weights. The
-        // pseudo-measurement of zero sideslip biases it by the fraction (0.05 / 5)². 0.03° is a fiftieth of the error
-        // that the LQI tolerates.
+        // Every measurement is consistent with the motion, so the filter must converge to it with any weights. The
+        // pseudo-measurement of zero sideslip biases the sideslip by the fraction (0.05 / 5)². 0.03° is a fiftieth of
+        // the error that the LQI tolerates.
         for (air, attitude, turn) in
             [([21.0, 1.5, 2.0], [0.6, 0.25], 0.35), ([19.0, -2.0, 0.5], [-0.9, -0.1], -0.6)]
         {
@@ -341,7 +343,7 @@ mod tests {
 
     #[test]
     fn a_first_airspeed_that_was_wrong_is_forgotten_within_half_a_second() {
-        // 6 m/s too fast: the path seems flatter, and the angle of attack larger by 1.4°.
+        // An airspeed that is too high by 6 m/s makes the path seem flatter and the angle of attack larger by 1.4°.
         let (sin, cos) = 4f64.to_radians().sin_cos();
         let good = turning([20.0 * cos, 0.0, 20.0 * sin], [0.0, 10f64.to_radians()], 0.0, 0.0);
         let mut filter = AirData::default();

@@ -154,7 +154,7 @@ impl Assembly {
         let climb = self.fill_air(host, &mut next);
         // stale parts do not count as frozen, because they are already a fault
         if self.stands_still(quaternion, rates) && next.faults.is_empty() {
-            // the estimator would continue by itself, and hide from the pilot that all sensors are frozen
+            // the estimator would change the angles, and so hide from the pilot that all sensors are frozen
             (next.state.alpha, next.state.beta) = (self.last.state.alpha, self.last.state.beta);
         } else {
             self.fill_incidence(host, &mut next, climb, step.as_secs_f64());
@@ -220,8 +220,8 @@ impl Assembly {
         };
         let estimated = self.estimator.update(&measured, step);
         let whole = !next.faults.contains(Faults::SPECIFIC_FORCE);
-        // ArduPilot derives AOA_SSA from its wind estimate, without vanes. With real ArduPlane the standard deviation
-        // of its sideslip error was 1.7°, that of this estimate 0.4°.
+        // ArduPilot derives AOA_SSA from its wind estimate, not from vanes. With real ArduPlane, the standard deviation
+        // of its sideslip error was 1.7°, and that of this estimate was 0.4°.
         match estimated.filter(|_| whole).or(reported) {
             Some([alpha, beta]) => (next.state.alpha, next.state.beta) = (alpha, beta),
             None => next.faults.insert(Faults::INCIDENCE),

@@ -24,7 +24,8 @@ impl AttitudeRamp {
         self.last = None;
     }
 
-    /// The roll and pitch to command at `now` on the ramp to `wanted`, rad. After a reset the ramp starts at `seen`.
+    /// The roll and pitch to command at `now` on the ramp to `wanted`, rad. After a reset the ramp starts at the
+    /// measured attitude `seen`.
     pub(super) fn command(&mut self, now: Time, wanted: [f64; 2], seen: [f64; 2]) -> [f64; 2] {
         let (before, from) = self.last.unwrap_or((now, seen));
         let dt = now.since(before).as_secs_f64().min(GAP_S);

@@ -1,38 +1,39 @@
 //! Slow integral correction of the attitude that is commanded to a flight controller.
 //!
 //! The flight controller's loops leave a steady-state error of 0.3° to 1.8°. In steep turns, simulated loops with an
-//! elevator feed-forward that does not fit the aircraft leave up to 9° of pitch for half a minute.
+//! elevator feed-forward that does not fit the aircraft leave a pitch error of up to 9° for half a minute.
 //!
-//! The error is integrated over seconds and within narrow bounds, while the wanted attitude is constant and nearly
-//! reached. Constant errors are removed. Transients are left to the flight controller.
+//! The error is integrated slowly and within narrow bounds, and only while the setpoint is constant and nearly reached.
+//! This removes constant errors and leaves transients to the flight controller.
 
 use greylag_physics::Time;
 
 /// Time constant of the integrator, s: five times that of a flight controller's attitude loop.
 const TIME_S: f64 = 2.5;
-/// Largest correction, rad. The simulated loops of PX4 and ArduPlane have this error at 55° of bank and 20° nose down.
+/// Largest correction, rad. The simulated loops of PX4 and ArduPlane have an error of this size at 55° of bank and 20°
+/// nose down.
 const MOST: f64 = 10.0 * DEGREE;
-/// Change of the wanted attitude that restarts the settling time, rad.
+/// Change of the setpoint that restarts the settling time, rad.
 const STILL: f64 = 0.5 * DEGREE;
-/// Time for which the wanted attitude must be constant before the error is integrated, s. After a reversal of the bank,
-/// PX4's roll oscillates for this time with a period of 5 s.
+/// Time for which the setpoint must be constant before the error is integrated, s. After a reversal of the bank, PX4's
+/// roll oscillates for this time with a period of 5 s.
 const SETTLING_S: f64 = 4.0;
-/// Error above which integration stops, rad, because it is not a steady-state error.
+/// Error above which integration stops, rad. A larger error is not a steady-state error.
 const NEAR: f64 = 12.0 * DEGREE;
-/// Change of the wanted attitude that resets the correction, rad.
+/// Change of the setpoint that resets the correction, rad.
 const ANOTHER: f64 = 4.0 * DEGREE;
 /// Time between two states above which integration is skipped, s.
 const GAP_S: f64 = 0.1;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// Integral correction of roll and pitch.
+/// Integral correction of the roll and pitch setpoints.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AttitudeTrim {
     added: [f64; 2],
-    /// The wanted attitude at which the correction was integrated, rad.
+    /// The roll and pitch setpoint at which the correction was integrated, rad.
     found_at: [f64; 2],
     last: Option<Time>,
-    /// The constant wanted attitude, rad, and the time since which it has been constant.
+    /// The constant setpoint, rad, and the time since which it has been constant.
     standing: Option<([f64; 2], Time)>,
 }
 
@@ -42,7 +43,7 @@ impl AttitudeTrim {
         *self = AttitudeTrim::default();
     }
 
-    /// The roll and pitch to command at `now`, rad, for the wanted attitude `wanted` and the measured attitude `seen`.
+    /// The roll and pitch to send at `now`, rad, for the setpoint `wanted` and the measured attitude `seen`.
     pub(super) fn command(&mut self, now: Time, wanted: [f64; 2], seen: [f64; 2]) -> [f64; 2] {
         let dt = self.last.replace(now).map_or(0.0, |last| now.since(last).as_secs_f64());
         let stands = self.standing.filter(|(stood, _)| !far(*stood, wanted, STILL));
@@ -55,7 +56,7 @@ impl AttitudeTrim {
             if (self.found_at[axis] - wanted[axis]).abs() > ANOTHER {
                 *added = 0.0;
             }
-            // error of the controller with respect to its command, which includes the correction
+            // error of the flight controller relative to what it was sent, including the correction
             let left = (wanted[axis] + *added - seen[axis]).abs();
             if settled && dt <= GAP_S && left <= NEAR {
                 *added = (*added + (wanted[axis] - seen[axis]) * dt / TIME_S).clamp(-MOST, MOST);
@@ -75,8 +76,9 @@ fn far(a: [f64; 2], b: [f64; 2], by: f64) -> bool {
 mod tests {
     use super::*;
 
-    /// Attitude error at each tick of 20 s of flight, rad. The controller follows within half a second and keeps an
-    /// error of `error` (rad). `wanted` is the wanted roll (rad) as a function of time (s). The flight starts there.
+    /// Roll error at each tick of 20 s of flight, rad. The flight controller has a time constant of half a second and a
+    /// constant error of `error` (rad). `wanted` is the roll setpoint (rad) as a function of time (s). The flight
+    /// starts at the setpoint.
     fn flown(error: f64, wanted: impl Fn(f64) -> f64) -> Vec<f64> {
         let (mut trim, mut roll) = (AttitudeTrim::default(), wanted(0.0));
         (0..2000)
@@ -104,7 +106,7 @@ mod tests {
         // At most 10° of the 11° are removed.
         assert!((errors[1999].abs() / DEGREE - 1.0).abs() < 0.01, "{}", errors[1999] / DEGREE);
         assert!(flown(13.0 * DEGREE, |_| 0.8)[1999].abs() > 12.9 * DEGREE, "no error that stays");
-        // 0.5 Hz: the wanted attitude is never constant, so no correction is added.
+        // A setpoint that oscillates at 0.5 Hz is never constant, so no correction is added.
         let sine = |t: f64| 0.3 * (3.1 * t).sin();
         let mut plain = 0.0;
         for (tick, error) in flown(0.01, sine).into_iter().enumerate() {
@@ -147,7 +149,8 @@ mod tests {
 
     #[test]
     fn the_trim_takes_its_time() {
-        // After 4 s of settling time the time constant is 2.5 s: after 7 s, e^(−1.2) of 1.8° remains, 0.54°.
+        // Integration starts after 4 s of settling, with a time constant of 2.5 s. At 7 s, 1.8° · e^(−1.2) = 0.54°
+        // remains.
         let left = flown(1.8 * DEGREE, |_| 0.8)[700].abs() / DEGREE;
         assert!((left - 0.54).abs() < 0.05, "{left}");
     }

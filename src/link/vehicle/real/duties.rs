@@ -122,7 +122,7 @@ impl Real {
         let message = wire::set_mode(to, mode.main, mode.sub);
         bytes.extend(self.write(&message));
         if !steer && (stack, self.profile.authority) == (Stack::Ardupilot, Authority::Surfaces) {
-            // the channels are returned to the radio
+            // the channels are returned to the RC transmitter
             let message = wire::channels_override(to, [0; 3]);
             bytes.extend(self.write(&message));
         }

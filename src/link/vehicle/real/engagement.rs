@@ -1,7 +1,8 @@
 //! Control authority: its request from the flight controller, and its return.
 //!
-//! The mode in HEARTBEAT or CURRENT_MODE decides. COMMAND_ACK does not decide, because PX4 sends two for a mode
-//! request, of which the first is always ACCEPTED. A link may also lose either of them.
+//! The mode in HEARTBEAT or CURRENT_MODE shows whether the companion has control authority. COMMAND_ACK does not show
+//! it: PX4 sends two for a mode request, the first of which is always ACCEPTED, and the link may lose either. The
+//! "steered mode" is the mode in which the flight controller executes the companion's commands.
 
 use std::time::Duration;
 
@@ -11,7 +12,7 @@ use super::profile::{Authority, Stack};
 pub(super) const ASK_AGAIN: Duration = Duration::from_millis(250);
 /// Timeout from the first possible request until the controller shows the mode.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// Time after which an unconfirmed return is reported. Two heartbeats are due in this time.
+/// Time after which an unconfirmed return of control authority is reported. Two heartbeats are due in this time.
 const UNCONFIRMED: Duration = Duration::from_secs(2);
 /// Time after engagement in which another mode is ignored. HEARTBEAT and CURRENT_MODE may arrive in the wrong order.
 const GRACE: Duration = Duration::from_millis(100);
@@ -53,7 +54,8 @@ pub(super) struct Engagement {
     refused: Option<u8>,
     /// Whether any mode request was accepted.
     accepted: bool,
-    /// Whether engagement is blocked: after a return, until the demand has ended once.
+    /// Whether engagement is blocked. It is blocked after a return of control authority, until the companion has
+    /// stopped demanding it once.
     barred: bool,
     /// Whether the unconfirmed return was reported.
     reminded: bool,
@@ -81,7 +83,7 @@ impl Engagement {
         matches!(self.phase, Phase::Engaged { .. })
     }
 
-    /// Starts engagement if it is demanded and not blocked. Returns whether it starts now.
+    /// Starts engagement, unless it is blocked or has started already. Returns whether it starts now.
     pub(super) fn begin(&mut self, host: Duration) -> bool {
         let begins = !self.barred && !self.steers();
         if begins {
@@ -91,7 +93,7 @@ impl Engagement {
         begins
     }
 
-    /// Registers the end of the demand, and releases control authority.
+    /// Registers that control authority is no longer demanded, and releases it.
     pub(super) fn rest(&mut self) {
         self.barred = false;
         if self.steers() {
@@ -99,7 +101,7 @@ impl Engagement {
         }
     }
 
-    /// Returns control authority. Engagement is blocked until the demand has ended once.
+    /// Returns control authority. Engagement is blocked until the companion has stopped demanding it once.
     pub(super) fn hand_back(&mut self) {
         self.barred = true;
         self.release();
@@ -275,7 +277,7 @@ mod tests {
             engagement.request(ms(0));
             assert_eq!(engagement.shown(ms(10), true), Shown::Engaged);
             assert_eq!(engagement.shown(ms(10 + late), false), shown);
-            // the controller's pilot has control: engagement is blocked until the demand has ended once
+            // the controller's pilot has control: engagement is blocked until it was not demanded once
             assert!(!engagement.begin(ms(200)));
             assert_eq!(engagement.is_engaged(), shown == Shown::Nothing);
             engagement.rest();

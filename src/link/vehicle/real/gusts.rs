@@ -1,9 +1,9 @@
 //! Turbulence intensity, estimated from airspeed and velocity over ground.
 //!
-//! Without vanes no sensor measures a gust from the side or from below. An estimated angle of attack or sideslip has an
-//! error of the gust divided by the airspeed. Gusts along the path are measurable: they are the difference between the
-//! velocity over ground, less the mean wind, and the airspeed. At altitude all three components have the same intensity
-//! (MIL-F-8785C, 3.7.2).
+//! Without vanes no sensor measures a gust from the side or from below. An angle of attack or sideslip that is
+//! estimated without vanes has an error equal to the gust velocity divided by the airspeed. Gusts along the path are
+//! measurable: they are the difference between the velocity over ground, less the mean wind, and the airspeed. At
+//! altitude all three components have the same intensity (MIL-F-8785C, 3.7.2).
 
 /// Time constant of the mean wind, s.
 const WIND_S: f64 = 10.0;
@@ -14,9 +14,9 @@ const SUPPOSED_MPS: f64 = 1.5;
 const SUPPOSED_S: f64 = 20.0;
 /// Scale length of gusts at altitude, m (MIL-F-8785C above 2000 ft).
 const LENGTH_M: f64 = 533.0;
-/// Factor on the gusts in the standard deviation of the flow angles. A gust lasts for half a minute and does not
-/// average out. The largest gust of a flight therefore counts: 3.5 standard deviations, where independent errors count
-/// two.
+/// Factor on the gusts in the standard deviation of the flow angles. A gust can last for half a minute, so it does not
+/// average out, and the band of two standard deviations must cover the largest gust of a flight: 3.5 standard
+/// deviations.
 const LASTING: f64 = 1.75;
 /// Lowest airspeed at which gusts are estimated, and lowest divisor of a gust, m/s.
 const SLOWEST_MPS: f64 = 3.0;
@@ -73,7 +73,7 @@ impl Gusts {
         (0..3).for_each(|i| wind[i] += off[i] * dt / (WIND_S + dt));
         let along: f64 = off.iter().zip(path).map(|(a, b)| a * b).sum();
         self.averaged = (self.averaged + dt).min(AVERAGED_S);
-        // the mean wind absorbs the slow part of the gusts, a known fraction for a first-order process
+        // the mean wind absorbs the slow part of the gusts, which is a known fraction for a first-order process
         let whole = along.powi(2) * (1.0 + LENGTH_M / (airspeed * WIND_S));
         self.power += (whole - self.power) * dt / self.averaged;
     }
@@ -123,7 +123,7 @@ mod tests {
         for i in 0..6000 {
             let yaw = 0.02 * f64::from(i) * step;
             if i % 10 == 0 {
-                // twelve uniform numbers less six are nearly normal
+                // the sum of twelve uniform numbers, less six, is nearly normal
                 let normal: f64 = (0..12).map(|_| uniform(&mut seed)).sum::<f64>() - 6.0;
                 gust = decay * gust + intensity * (1.0 - decay * decay).sqrt() * normal;
             }

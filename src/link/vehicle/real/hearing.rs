@@ -60,7 +60,7 @@ impl Real {
                     self.survey.restart(host, id);
                 }
             }
-            // overrides sent by the companion may be reported as a radio
+            // the companion's own overrides may be reported as an RC transmitter
             ControllerMessage::Receiver { alive } if !self.engagement.steers() => {
                 self.radio = Some(alive);
             }

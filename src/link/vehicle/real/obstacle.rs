@@ -9,9 +9,9 @@ const SHUT_OUT: &str = "the controller signs its frames and ignores ours, which 
                         signature: give its key with --sign and add --sign-vehicle";
 
 impl Real {
-    /// Warning about a radio while surfaces are commanded; `None` without a radio. When the overrides end, ArduPlane
-    /// returns to the radio's sticks in MANUAL. It leaves MANUAL only by its ground-station failsafe. The companion
-    /// acts as that ground station.
+    /// Warning about an RC transmitter while surfaces are commanded; `None` without one. When the overrides end,
+    /// ArduPlane returns to the transmitter's sticks in MANUAL. It leaves MANUAL only by its ground-station failsafe.
+    /// The companion acts as that ground station.
     pub fn radio_warning(&self) -> Option<String> {
         let by_channels =
             (self.profile.stack, self.profile.authority) == (Stack::Ardupilot, Authority::Surfaces);

@@ -15,7 +15,8 @@ const TRIES: u32 = 5;
 /// Valid pulse widths of a channel, µs.
 pub(super) const PULSE: std::ops::RangeInclusive<f64> = 800.0..=2200.0;
 
-/// Longest text of violations in characters. With what precedes it, it fits into the texts that a client is sent.
+/// Longest text of violations in characters. Together with its introduction it fits into the longest text that is sent
+/// to a client.
 const LONGEST: usize = 330;
 
 /// State of one rule's parameter.
@@ -102,8 +103,8 @@ impl Parameters {
         entry.value.map(|(_, value)| value)
     }
 
-    /// Each relevant parameter under the name that the controller uses, with its check result and the remedy. `radio`
-    /// is whether the controller receives a radio.
+    /// Each relevant parameter under the name that the controller uses, with its check result and a text, which names
+    /// the remedy of a violation. `radio` is whether the controller receives an RC transmitter.
     pub fn report(&self, system: u8, radio: bool) -> Vec<(&'static str, Standing, String)> {
         let matters = |entry: &&Entry| radio || entry.rule.matters == Matters::Always;
         self.entries.iter().filter(matters).map(|entry| entry.report(system)).collect()
@@ -144,7 +145,8 @@ impl Parameters {
     }
 }
 
-/// The texts in one, the first always, up to [`LONGEST`] characters. The others are counted.
+/// Joins the texts up to [`LONGEST`] characters. The first text is always included. The texts that do not fit are
+/// counted.
 fn joined(texts: &[String]) -> String {
     let mut words = String::new();
     for (at, text) in texts.iter().enumerate() {

@@ -28,7 +28,7 @@ pub enum Authority {
 pub struct Profile {
     /// Flight stack of the controller.
     pub stack: Stack,
-    /// Quantities that the controller is commanded.
+    /// Quantities that the companion commands.
     pub authority: Authority,
     /// Actuator dynamics of the aircraft. The controller does not report actuator states.
     pub actuators: ActuatorFigures,
@@ -133,7 +133,7 @@ pub struct Rule {
 pub enum Matters {
     /// Under all conditions.
     Always,
-    /// Only while the controller receives a radio.
+    /// Only while the controller receives an RC transmitter.
     WithRadio,
 }
 
@@ -217,8 +217,8 @@ const ARDUPILOT_SURFACES: [Rule; 31] = [
     with_radio(rule(&["FS_LONG_TIMEOUT"], Need::Between(1.5, 3.0), 2.0, RADIO)),
     optional(with_radio(rule(&["MAV_GCS_SYSID_HI"], Need::OneOf(ZERO), 0.0, STATION))),
     rule(&["RC_OPTIONS"], Need::Without(2), 32.0, "bit 1 makes it ignore overrides"),
-    // Until 4.7, RCMAP assigns the channels and their options are 0. Later releases assign them by the options and lack
-    // RCMAP.
+    // Until ArduPilot 4.7, RCMAP_* assigns the channels and RCn_OPTION is 0. Later releases assign them by RCn_OPTION
+    // and have no RCMAP_*.
     optional(rule(&["RCMAP_ROLL"], Need::OneOf(ONE), 1.0, ROLL)),
     optional(rule(&["RCMAP_PITCH"], Need::OneOf(&[2.0]), 2.0, PITCH)),
     optional(rule(&["RCMAP_THROTTLE"], Need::OneOf(&[3.0]), 3.0, THROTTLE)),
@@ -248,7 +248,8 @@ const STATION: &str =
     "a radio is bound: a ground station's heartbeats would hide that the companion is dead";
 const FILTER: &str = "a low-pass of the gyros makes the loop late";
 const SCALE: &str = "the pulses are scaled by it";
-/// Loop rate of the controller, Hz. States at 100 Hz need 125 Hz. There is no flight experience below 200 Hz.
+/// Loop rate of the flight controller, Hz. States at 100 Hz need a loop of 125 Hz, because a stream has at most 0.8 of
+/// the loop rate. Rates below 200 Hz were not flown.
 const LOOP_RATE: Need = Need::Between(200.0, 2000.0);
 
 const ARDUPILOT_ATTITUDE: [Rule; 2] = [
@@ -285,9 +286,9 @@ impl Stack {
         }
     }
 
-    /// Time for which commands are streamed before the steered mode is requested. PX4 checks its requirements every 100
-    /// ms, and its stick input first passes through another module. It refused 2 of 3 requests at 150 ms, none at 300
-    /// ms. ArduPilot requires no stream. Early sticks would act in LOITER.
+    /// Time for which commands are streamed before the steered mode is requested. PX4 checks its requirements every
+    /// 100 ms, and its stick input first passes through another module. It refused 2 of 3 requests after 150 ms, and
+    /// none after 300 ms. ArduPilot requires no stream before the request. Sticks sent early would act in LOITER.
     pub fn lead(self) -> Duration {
         match self {
             Stack::Px4 => Duration::from_millis(500),
@@ -321,7 +322,7 @@ impl Stack {
         }
     }
 
-    /// State frames per command. ArduPilot samples its channels at 50 Hz, every second frame.
+    /// State frames (100 Hz) per command. ArduPilot samples its channels at 50 Hz. Attitudes are also sent at 50 Hz.
     pub fn frames_per_command(self, authority: Authority) -> u64 {
         match (self, authority) {
             (Stack::Px4, Authority::Surfaces) => 1,

@@ -1,4 +1,5 @@
-//! Watchdog while surfaces are commanded: rates of received states, lost frames and executed cycles.
+//! Watchdog while surfaces are commanded. It checks the rates of received states and executed cycles, and the fraction
+//! of lost frames.
 
 use std::time::Duration;
 
@@ -9,8 +10,9 @@ const RATE: f64 = 100.0;
 /// Fraction of the nominal rate below which control authority is returned.
 const LEAST: f64 = 0.4;
 
-/// Largest fraction of lost frames in each of two consecutive windows. Commands are probably lost at the same
-/// rate. Surfaces that receive only every fourth command oscillate. A single gap of 0.2 s stays below the limit.
+/// Largest fraction of lost frames. Control authority is returned if two consecutive windows exceed it. Commands are
+/// probably lost at the same rate, and the loop oscillates if only every fourth command reaches the surfaces. A single
+/// gap of 0.2 s exceeds the limit in one window at most.
 const LOSSY: f64 = 0.35;
 
 /// Counters of states and cycles in the open window.
@@ -36,8 +38,8 @@ impl Pulse {
         *self = Pulse::default();
     }
 
-    /// Counts a cycle at `host`. Returns a text about the shortage in the window that this cycle closes; `None` without
-    /// one. `frames` are the total frames received and lost.
+    /// Counts a cycle at `host`. If this closes a window with too few cycles, too few states or too many lost frames,
+    /// returns a text about it; otherwise `None`. `frames` are the total frames received and lost.
     pub(super) fn cycle(&mut self, host: Duration, frames: [u64; 2]) -> Option<String> {
         self.cycles += 1;
         let before = *self.before.get_or_insert(frames);

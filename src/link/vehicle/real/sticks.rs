@@ -24,7 +24,7 @@ impl Rounding {
     }
 }
 
-/// Rounding remainders of aileron, elevator, throttle, and the scaling that was last valid.
+/// Rounding remainders of aileron, elevator and throttle, and the last valid scaling.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sticks {
     remainders: [Rounding; 3],
@@ -48,8 +48,8 @@ impl Default for Scaling {
 }
 
 impl Scaling {
-    /// The scaling by the parameters with these names, and PX4's defaults for unread ones; `None` if a value is
-    /// invalid.
+    /// The scaling from the parameters named `scale` and `trim`. PX4's defaults replace unread parameters. `None` if a
+    /// value is invalid.
     fn of(parameters: &Parameters, scale: &str, trim: &str) -> Option<Scaling> {
         let scale = parameters.get(scale).unwrap_or(1.0);
         let trim = parameters.get(trim).unwrap_or(0.0);
@@ -73,9 +73,9 @@ impl Default for Channel {
 }
 
 impl Channel {
-    /// The channel by RCn_MIN, RCn_TRIM, RCn_MAX and RCn_REVERSED of channel `number`, and ArduPilot's defaults for
-    /// unread ones; `None` if the values are invalid: an end beyond 800 µs to 2200 µs, ends in the wrong order, a trim
-    /// that is not between them.
+    /// Channel `number` from its RCn_MIN, RCn_TRIM, RCn_MAX and RCn_REVERSED. ArduPilot's defaults replace unread
+    /// parameters. `None` if the values are invalid: an end outside 800 µs to 2200 µs, ends in the wrong order, or a
+    /// trim that is not between them.
     fn of(parameters: &Parameters, number: usize) -> Option<Channel> {
         let read = |name: &str| parameters.get(&format!("RC{number}_{name}"));
         let usual = Channel::default();
@@ -165,7 +165,7 @@ mod tests {
         }
         for (sum, wanted) in sums.iter().zip([command.elevator, command.aileron, command.throttle])
         {
-            // Rounding errs by at most half a count over a thousand commands.
+            // The sum of a thousand commands deviates by at most half a count.
             assert!((sum * 1e-6 - wanted).abs() < 1e-6, "{sum} for {wanted}");
         }
     }
@@ -240,8 +240,8 @@ mod tests {
         assert_eq!(sent(0.0, 1.0), (1400, 1000));
     }
 
-    /// Pulse widths of roll, pitch and throttle, µs, at half right aileron, half of the elevator up and half throttle,
-    /// with the remainders of no earlier command.
+    /// Pulse widths of roll, pitch and throttle, µs, at half right aileron, half up elevator and half throttle, without
+    /// remainders of earlier commands.
     fn half(sticks: &Sticks, parameters: &Parameters) -> [u16; 3] {
         let command = Command { aileron: 0.5, elevator: -0.5, throttle: 0.5, rudder: 0.0 };
         let mut sticks = Sticks { remainders: Default::default(), ..*sticks };

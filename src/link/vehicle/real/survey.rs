@@ -24,7 +24,7 @@ pub struct Traffic {
     /// Arrival of the last frame, host clock.
     last: Duration,
     in_window: u32,
-    /// Mean interval and sum of squared deviations from it (Welford), s.
+    /// Mean interval (s), and sum of the squared deviations from it (s²), by Welford's method.
     mean: f64,
     squares: f64,
 }
@@ -75,7 +75,7 @@ impl Survey {
             // a late frame was counted as lost before
             Some(back) if u32::from(back) > 256 - LATE => self.lost = self.lost.saturating_sub(1),
             Some(ahead) => {
-                // a step of more than half the counter is a restart
+                // a step of more than half of the counter's range is a restart
                 self.lost += if ahead <= 128 { u64::from(ahead - 1) } else { 0 };
                 self.sequence = Some(sequence);
             }

@@ -1,4 +1,4 @@
-// Means in bins, maps of colour, lines by decades; and the choices that show one figure of several.
+// Charts of means in bins, heat maps and curves; and the choices that show one of several figures.
 
 const counted = (n) => `${n} ${n === 1 ? "sample" : "samples"}`;
 function span(from, to, unit) {
@@ -6,7 +6,7 @@ function span(from, to, unit) {
   if (from == null) return to == null ? "all" : `under ${show(to)}${u}`;
   return to == null ? `over ${show(from)}${u}` : `${show(from)} to ${show(to)}${u}`;
 }
-/** Arrow keys step through `count` places of a plot; `at(i)` shows one, `at(-1)` none. */
+/** Arrow keys step through the `count` points of a plot. `at(i)` shows the values at point i, `at(-1)` shows none. */
 function stepping(host, count, at) {
   let i = -1;
   host.onkeydown = (e) => {
@@ -21,7 +21,7 @@ function stepping(host, count, at) {
 
 // ---- means in bins ----
 
-/** The heights that all panels of a figure share: those of the bins with support, if any has it. */
+/** The vertical range that all panels of a figure share. It covers the bins with enough samples, else all bins. */
 function intervalRange(data) {
   for (const supportedOnly of [true, false]) {
     let [low, high] = [0, 0];
@@ -51,7 +51,7 @@ function intervalChart(host, data) {
   const xr = named ? [-0.6, panel.names.length - 0.4] : padded(low, high);
   const yr = intervalRange(data);
   let told = -1;
-  // Models side by side in a bin, so that none hides another.
+  // The models are side by side in a bin, so that none hides another.
   const aside = (k) => (k - (panel.lines.length - 1) / 2) * 6 * px();
   const draw = (u) => clipped(u, (ctx, box) => {
     const at = (v) => u.valToPos(v, "y", true);
@@ -114,7 +114,7 @@ function intervalChart(host, data) {
   return u;
 }
 const shortened = (text) => (text.length > 14 ? `${text.slice(0, 6)}…${text.slice(-7)}` : text);
-/** A touch reads the plot as a mouse does. */
+/** A touch moves the cursor as a mouse does. */
 function tapping(u) {
   for (const kind of ["pointerdown", "pointermove"]) u.over.addEventListener(kind, (e) => {
     if (e.pointerType !== "touch") return;
@@ -123,10 +123,10 @@ function tapping(u) {
   });
 }
 
-// ---- maps of colour ----
+// ---- heat maps ----
 
 const channels = (name) => style(name).match(/[0-9a-f]{2}/gi).map((h) => parseInt(h, 16));
-/** The colour of a share from −1 (too low) over 0 to 1. */
+/** The colour for a value between −1 and 1. */
 function diverging(share) {
   const s = Math.max(-1, Math.min(1, share));
   const [zero, end] = [channels("zero"), channels(s < 0 ? "negative" : "positive")];
@@ -195,7 +195,7 @@ function heatChart(host, data) {
   return u;
 }
 
-// ---- lines over a quantity, by decades or evenly ----
+// ---- curves on a logarithmic or linear axis ----
 
 function curvesChart(host, data) {
   const height = (v) => (v != null && (data.linear || v > 0) ? v : null);
@@ -255,7 +255,7 @@ function curvesChart(host, data) {
 
 const choices = [...document.querySelectorAll(".choice")];
 const hidden = (host) => host.closest(".option[hidden]") != null;
-/** Shows `option` in every choice called `label` that has it. */
+/** Shows `option` in every choice called `label` that has this option. */
 function choose(label, option) {
   for (const box of choices.filter((c) => c.dataset.label === label)) {
     const own = [...box.children].filter((o) => o.className === "option");

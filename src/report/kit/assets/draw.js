@@ -1,4 +1,4 @@
-// Numbers as text, axes, and what uPlot does not draw: bands, levels, marks.
+// Formats numbers, makes axes, and draws what uPlot does not draw: bands, levels and marks.
 
 const root = document.documentElement;
 const figures = JSON.parse(document.getElementById("figures").textContent);
@@ -10,7 +10,7 @@ const MINUS = "−";
 // ---- numbers ----
 
 const signed = (text) => text.replace("-", MINUS);
-/** A value with digits enough for its size. */
+/** A value as text, with decimals according to its magnitude. */
 function show(v) {
   if (v == null || !isFinite(v)) return "";
   const a = Math.abs(v);
@@ -23,9 +23,9 @@ function showTicks(u, splits) {
   while (digits < 6 && Math.abs(step * 10 ** digits - Math.round(step * 10 ** digits)) > 1e-6) digits++;
   return splits.map((v) => (v == null ? "" : signed(v.toFixed(digits))));
 }
-/** A value as it was chosen: 0.5, 10. */
+/** A value as text with at most three significant digits, such as 0.5 or 10. */
 const showChosen = (v) => signed(String(+v.toPrecision(3)));
-/** A decade as it is spoken: 0.01, 1, 1000. */
+/** A power of ten as a decimal number: 0.01, 1, 1000. */
 const showDecade = (v) => (v >= 1 ? String(Math.round(v)) : v.toFixed(Math.max(0, Math.round(-Math.log10(v)))));
 
 // ---- scales and axes ----
@@ -40,7 +40,7 @@ function decades(u, axis, low, high) {
   for (let k = Math.ceil(Math.log10(low) - 1e-9); k <= Math.log10(high) + 1e-9; k++) found.push(10 ** k);
   return found;
 }
-/** Decades, with 2 and 5 between them while there are few. */
+/** Ticks at powers of ten; also at 2 and 5 times these if the range is below 3.5 decades. */
 function decadesFine(u, axis, low, high) {
   const found = [];
   for (let k = Math.floor(Math.log10(low)); k <= Math.log10(high); k++)
@@ -59,7 +59,7 @@ function axis(extra) {
 const sideWidth = () => Math.round(3.6 * rem());
 const sideAxis = (extra) => axis({ size: sideWidth(), space: 1.9 * rem(), values: showTicks, ...extra });
 
-// ---- drawing beside the lines ----
+// ---- bands, levels and marks ----
 
 const px = () => devicePixelRatio;
 function clipped(u, draw) {

@@ -1,4 +1,4 @@
-// Legends, and the clock that all time figures share: zoom, cursor, mouse, keys, touch.
+// Legends, and the time axis that all time figures share: zoom, cursor, mouse, keys, touch.
 
 // ---- legends ----
 
@@ -14,7 +14,7 @@ function sample(kind, shape) {
   }[shape] || line;
   return `<svg viewBox="0 0 26 12" aria-hidden="true">${drawn}</svg>`;
 }
-/** Adds a legend to the figure of `host`; `onToggle(index)` says whether the line is shown now. */
+/** Adds a legend to the figure of `host`; `onToggle(index)` switches a line and returns whether it is now visible. */
 function legend(host, entries, onToggle) {
   const caption = host.parentElement.querySelector("figcaption");
   caption.querySelector(".legend")?.remove();
@@ -41,13 +41,13 @@ function legend(host, entries, onToggle) {
   return outputs;
 }
 
-// ---- the shared clock ----
+// ---- the shared time axis ----
 
 let charts = [];
 let timeCharts = [];
 let whole = [Infinity, -Infinity];
 let view = whole;
-/** The clock spans the time figures that are seen; the view stays while the span does. */
+/** Sets the time axis to the span of the visible time figures. The zoom is kept if the span is unchanged. */
 function newClock(seen) {
   let [low, high] = [Infinity, -Infinity];
   for (const f of seen) for (const { time_s: t } of f.data.tracks) {
@@ -88,7 +88,7 @@ function shift(seconds) {
   look(view[0] + by, view[1] + by);
 }
 
-// ---- hands ----
+// ---- keyboard, mouse and touch ----
 
 function keys(host, u) {
   const at = () => (u.cursor.left >= 0 ? u.cursor.left : u.over.clientWidth / 2);
@@ -132,7 +132,7 @@ function touch(u) {
     if (fingers.size === 2 && held) pinch();
   };
   const pinch = () => {
-    // The two instants that were touched stay under the fingers.
+    // The two touched times stay under the fingers.
     const width = u.over.clientWidth;
     const [a, b] = [...fingers.values()].map((x) => left(x) / width);
     if (Math.abs(a - b) < 0.02) return;

@@ -1,4 +1,4 @@
-// Draws every figure of the page, and again when its width or theme changes.
+// Draws every figure of the page, and redraws them when the width or the theme changes.
 
 // ---- figures ----
 
@@ -6,7 +6,7 @@ function size(host) {
   return { width: Math.max(120, host.clientWidth), height: Math.max(80, host.clientHeight) };
 }
 
-/** Samples between two gaps, which a line alone would not show. */
+/** Indices of single samples between two gaps, for which a line would show nothing. */
 function lonePoints(u, k) {
   const ys = u.data[k];
   const lone = [];
@@ -208,9 +208,9 @@ function xyChart(host, data) {
       sideAxis({ label: data.y_label, labelSize: 1.4 * rem(), labelGap: 0 }),
     ],
     series: [{}, { paths: () => null, points: { show: false } }],
-    // The bands lie behind what is drawn, whatever the order of the hooks.
+    // The bands are drawn first, so that they lie behind the series.
     hooks: { draw: [bands, draw] },
-    // uPlot scales to two invisible corners; the figure itself is drawn above.
+    // uPlot sets its scales by two invisible corner points. The hooks draw the figure.
   }, [xr, yr], host);
   return u;
 }
@@ -257,7 +257,7 @@ for (const button of document.querySelectorAll("button.zoom")) {
 let drawnWidth = innerWidth;
 let waiting = 0;
 addEventListener("resize", () => {
-  // A phone's address bar changes the height alone, which changes nothing here.
+  // A phone's address bar changes only the height, which needs no redraw.
   if (innerWidth === drawnWidth) return;
   drawnWidth = innerWidth;
   clearTimeout(waiting);

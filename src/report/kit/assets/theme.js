@@ -1,3 +1,3 @@
-// Follows the reader's system until the button of the page says otherwise.
+// Sets the theme of the reader's system. The button of the page changes it.
 document.documentElement.dataset.theme =
   matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";

@@ -13,7 +13,7 @@ use crate::faults::judge::{Exposure, Finding};
 use crate::faults::mix::{Fault, FaultKind};
 
 impl Flight {
-    /// Steps of 10 ms until the companion is scheduled again; 0 if it is not suspended.
+    /// Number of 10 ms steps for which the companion is suspended; 0 if it is not suspended.
     pub(super) fn nap(&mut self, acting: &[Fault]) -> u64 {
         let starved = acting.iter().find(|fault| fault.kind == FaultKind::Starvation);
         let Some(Fault { strength, .. }) = starved else { return 0 };
@@ -24,8 +24,8 @@ impl Flight {
         }
     }
 
-    /// Ends the companion when its fault starts, and starts another one when the fault ends. Returns whether a
-    /// companion is running.
+    /// Ends the companion when a fault of the kind `Killed` starts, and starts another companion when this fault ends.
+    /// Returns whether a companion is running.
     pub(super) fn is_alive(&mut self, acting: &[Fault]) -> bool {
         let killed = acting.iter().any(|fault| fault.kind == FaultKind::Killed);
         if killed && !self.killed {
@@ -44,7 +44,7 @@ impl Flight {
         !killed
     }
 
-    /// Exposure of the aircraft at this step that its companion cannot prevent.
+    /// The conditions to which the aircraft is exposed at this step and which its companion cannot prevent.
     pub(super) fn exposure(&mut self, acting: &[Fault]) -> Exposure {
         let inputs = self.aircraft.inputs();
         let same = std::mem::replace(&mut self.flown, inputs) == inputs;

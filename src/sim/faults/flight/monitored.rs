@@ -16,7 +16,7 @@ use greylag_flight::desk::Desk;
 use greylag_flight::monitor::Monitor;
 use greylag_link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 
-/// Random stream of attitude errors and winds.
+/// Id of the random stream of attitude errors and winds.
 const DRAWN: u64 = 30;
 /// Bounds (±) of the uniformly drawn errors of roll, pitch and heading, degrees. They represent alignment and compass
 /// errors.
@@ -41,7 +41,7 @@ pub enum Failure {
     StuckElevator,
     /// The aileron jams in flight.
     StuckAileron,
-    /// Ice: the simulator's effect `drag_alpha2=100`, with which the drag at cruise is twice the aircraft's.
+    /// Ice: the simulator's effect `drag_alpha2=100`, which doubles the drag at cruise.
     Ice,
     /// A centre of gravity 4 cm aft.
     ShiftedLoad,
@@ -82,7 +82,7 @@ impl Failure {
 /// Monitor reports of one flight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Watched {
-    /// Errors of roll, pitch and yaw, degrees.
+    /// Constant errors of the estimated roll, pitch and yaw, degrees.
     pub attitude_error_deg: [f64; 3],
     /// Time from which the companion can observe the failure, s. It is the time of the failure, or of the first
     /// engagement if the failure is active from the start. `None` if the companion was never engaged.

@@ -7,8 +7,8 @@ use greylag_flight::pilot::{Decision, Source, TICK_S};
 use greylag_link::autopilot::{Autopilot, Mode, Status};
 use greylag_link::vehicle::Vehicle;
 
-/// Time constants, s: of the low-pass filter on a surface deflection, and of the mean square of the high-pass
-/// remainder.
+/// Time constant of the low-pass filter that separates slow from fast motion of a surface, s. `MEAN_S` is the time
+/// constant of the mean square of the fast motion, s.
 const SLOW_S: f64 = 0.5;
 const MEAN_S: f64 = 1.0;
 /// Smallest difference of roll or pitch, rad, that counts as a new target.
@@ -76,7 +76,7 @@ impl Follower {
         (self.held_s, self.moved) = (0.0, 0.0);
     }
 
-    /// Updates the time for which the companion has controlled to the same attitude.
+    /// Updates the time for which the companion has held the same commanded attitude.
     fn steady(&mut self, flown: bool) {
         let target = self.decision.map_or([0.0; 2], |d| [d.target.roll, d.target.pitch]);
         let same = target.iter().zip(self.target).all(|(a, b)| (a - b).abs() < SAME);

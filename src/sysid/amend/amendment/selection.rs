@@ -1,4 +1,4 @@
-//! Forward selection of the requested effects: free runs over held-out flights decide on each fit.
+//! Forward selection of the requested effects. Free runs over held-out flights decide which effects are accepted.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -14,10 +14,10 @@ use crate::compare::HorizonScore;
 use crate::progress::{self, Progress, report};
 use greylag_model::GreyBox;
 
-/// Largest number of passes over the requested effects.
+/// Largest number of passes over the requested effects, and over the alternative conventions.
 const ROUNDS: usize = 3;
 
-/// A model with the effects accepted so far, and their fit.
+/// The fit of the model with the effects accepted so far, and its held-out scores `after`.
 #[derive(Clone)]
 pub(super) struct Selection {
     /// The fit of the model without added effects, with its held-out scores.
@@ -41,8 +41,8 @@ pub(super) struct Ask<'a> {
 }
 
 impl Ask<'_> {
-    /// Selects the effects that improve `model`. Effects that a diagnosis found together are first tried jointly. The others are
-    /// tried one by one.
+    /// Selects the effects that improve `model`. Effects with starting values from a diagnosis are first tried jointly. The
+    /// others are tried one by one.
     pub(super) fn selected(&self, model: &GreyBox) -> Result<Selection, AmendError> {
         let tuned = match &self.options.tuned {
             Some(known) => known.clone(),
@@ -71,7 +71,8 @@ impl Ask<'_> {
         let Options { effects, refused, .. } = self.options;
         let mut best = (so_far.fit, so_far.after);
         let mut accepted: Vec<&Added> = so_far.accepted.iter().collect();
-        // each verdict with the number of effects in the model when the effect was tried, 0 for accepted effects
+        // each verdict is paired with the number of other accepted effects when it was reached, or with 0 for jointly
+        // accepted effects
         let verdict = |added: &Added| {
             let tried = so_far.effects.iter().find(|e| e.id == added.id && e.joined);
             tried.map(|tried| (tried.clone(), 0))
@@ -102,8 +103,9 @@ impl Ask<'_> {
 
     /// Jointly fits the effects that a diagnosis found, and leaves out effects with implausible estimates.
     ///
-    /// A large error that one effect corrects can hide the gain of another effect. Trials one by one would miss this other
-    /// effect. `None` if fewer than two effects remain, or if held-out flights are not predicted better.
+    /// A large error that one effect corrects can hide the gain of another effect. Tests of single effects would miss this
+    /// other effect. Returns `None` if a fit fails, if fewer than two effects remain, or if the held-out error does not
+    /// decrease by more than 1 %.
     fn together(
         &self,
         model: &GreyBox,
@@ -122,7 +124,7 @@ impl Ask<'_> {
             return Ok(None);
         }
         let Some(mut kept) = fitted(&all)? else { return Ok(None) };
-        // an effect that coefficients of the model can represent would widen all intervals
+        // an effect that the model's coefficients can represent would widen the intervals of all estimates
         let mut fewer = all.clone();
         fewer.retain(|a| !judge::doubled(&a.id, &kept.0.parameters));
         if fewer.len() < all.len()
@@ -147,15 +149,15 @@ impl Ask<'_> {
         Ok(None)
     }
 
-    /// Tries the alternatives to the conventions of `model` one by one; `best` is the selection for `model`. A rejected
-    /// alternative is tried again after another one has been adopted.
+    /// Tries the alternatives to the conventions of `model` one by one. A rejected alternative is tried again after another
+    /// one has been adopted. `best` is the selection under the conventions of `model`.
     pub(super) fn with_conventions(
         &self,
         model: &GreyBox,
         mut best: Selection,
     ) -> Result<(Selection, Vec<Tried>), AmendError> {
         let mut base = model.clone();
-        // each verdict with the number of alternatives that had been adopted when it was reached
+        // each verdict is paired with the number of alternatives that had been adopted when it was reached
         let mut verdicts: [Option<(Tried, usize)>; Convention::ALL.len()] = Default::default();
         for _ in 0..ROUNDS {
             for (k, convention) in Convention::ALL.into_iter().enumerate() {
@@ -186,8 +188,9 @@ impl Ask<'_> {
         Ok((best, verdicts.into_iter().flatten().map(|(tried, _)| tried).collect()))
     }
 
-    /// The selection for `other`, the model under another convention, with the accepted effects. The other requested effects
-    /// are tried again only if the held-out error decreases or the fit follows its shots more closely. `None` if the fit fails.
+    /// The selection for `other`, the model under another convention. The accepted effects are fitted again. The other
+    /// requested effects are tried again only if the held-out error or the fit's residuals decrease. `None` if the fit
+    /// fails.
     fn under(&self, other: &GreyBox, best: &Selection) -> Result<Option<Selection>, AmendError> {
         let joined: Vec<&Added> = best.accepted.iter().collect();
         let Some(fit) = settled(self.with_effects(other, &joined, &best.fit.model))? else {
@@ -227,7 +230,7 @@ impl Ask<'_> {
         self.fit(&model, &options)
     }
 
-    /// Fits `model` to the training flights and reports progress as a share of the whole selection.
+    /// Fits `model` to the training flights and reports progress as a fraction of the whole selection.
     fn fit(&self, model: &GreyBox, options: &FitOptions) -> Result<Fit, AmendError> {
         let progress = progress::part(self.progress, self.done());
         self.begun.fetch_add(1, Ordering::Relaxed);
@@ -236,8 +239,8 @@ impl Ask<'_> {
         output_error::fit(model, self.train, &options, &progress)
     }
 
-    /// Shares of the whole selection that are done before and after the next fit. They are limited to 0.98, because some effects
-    /// are tried twice.
+    /// Fractions of the whole selection that are complete before and after the next fit. They are limited to 0.98, because
+    /// some effects are tried twice.
     fn done(&self) -> [f64; 2] {
         let begun = self.begun.load(Ordering::Relaxed) as f64;
         let planned = 1.0 + self.options.effects.len() as f64;
@@ -246,7 +249,7 @@ impl Ask<'_> {
 }
 
 impl Selection {
-    /// Held-out free-run error at the longest horizon up to 5 s that a run reaches; NaN if there is none.
+    /// Held-out free-run error at the longest horizon up to 5 s that a run reaches; NaN if no run reaches a horizon.
     fn error(&self) -> f64 {
         judge::judged(&self.after).unwrap_or(f64::NAN)
     }

@@ -17,15 +17,17 @@ use greylag_model::{GreyBox, Known};
 
 /// Half width of a 95 % interval in standard deviations of a normal distribution.
 const NORMAL_95: f64 = 1.96;
-/// A prior whose standard deviation is at least this share of the range of the bounds adds no information to the bounds.
+/// A prior adds no information to the bounds if its standard deviation is at least this fraction of the range of the
+/// bounds.
 const WIDE: f64 = 0.5;
-/// The flights excite a coefficient if its posterior standard deviation is below this share of its prior standard deviation.
+/// The flights excite a coefficient if its posterior standard deviation is below this fraction of its prior standard
+/// deviation.
 const LEARNED: f64 = 0.7;
 /// Magnitude of the error correlation above which two coefficients are confounded.
 const SAME: f64 = 0.9;
 /// Last change of a coefficient, in standard deviations, above which a fit has not converged.
 const UNSETTLED: f64 = 0.5;
-/// Last change of a coefficient, in standard deviations, above which no estimate is usable if the last step was accepted.
+/// A fit is rejected if the last accepted step changed a coefficient by more than this number of standard deviations.
 const LOST: f64 = 5.0;
 
 /// Note that names the held coefficients; `None` if there are none.
@@ -78,8 +80,8 @@ impl Search<'_> {
 
     /// The fit at the present estimates, with intervals.
     ///
-    /// Its model is `given` with the estimated coefficients and without terms for trims. `held` names the undetermined
-    /// coefficients.
+    /// The model of the fit is `given` with the estimated coefficients and without terms for trims. `held` names the
+    /// undetermined coefficients.
     pub(super) fn finish(self, given: &GreyBox, held: &[String]) -> Result<Fit, AmendError> {
         let model_name = || self.base.name.clone();
         if self.change.0.is_nan() || (self.change.0 > LOST && !self.stuck) {
@@ -153,7 +155,7 @@ impl Search<'_> {
         let (size, constants) = (self.of_flight(), self.asked.constants());
         let count = self.flights.len();
         let place = |flight: usize, which: usize| self.free.len() + flight * size + which;
-        // estimate less the mean over the flights: this mean is confounded with the model's coefficient
+        // the mean over the flights is subtracted from the estimate, because it is confounded with the model's coefficient
         let beside_mean = |flight: usize, which: usize| {
             let value =
                 |k: usize| self.place.own[k].unknowns(&self.asked).nth(which).unwrap_or(0.0);
@@ -251,8 +253,9 @@ impl Search<'_> {
 
     /// Factor on the intervals for disagreement between flights (Birge ratio, at least 1).
     ///
-    /// The factor is the root mean square difference between the estimates of single flights and the common estimate, in standard
-    /// deviations of the difference. It covers errors that are constant within a flight, for example a clock skew.
+    /// The factor is the root mean square difference between the estimates of single flights and the common estimate, in
+    /// standard deviations of the difference. It accounts for errors that are constant within a flight, for example a clock
+    /// skew.
     fn disagreement(&self, sd: &[f64], by_flight: &[Vec<FlightEstimate>]) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
         for (k, f) in self.free.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Damped Gauss–Newton step, limited by bounds and largest steps, and its size in standard deviations.
+//! Damped Gauss–Newton step, limited by the bounds and the largest steps of the coefficients.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -9,7 +9,7 @@ use crate::amend::flight::SENSORS;
 use crate::amend::normal::{self, Normal, Place};
 use crate::amend::parameters::Free;
 
-/// Normal equations of all shots together.
+/// Normal equations of all shots together, with the inverse variances `prior` of the unknowns.
 pub(super) struct System {
     pub(super) shots: Vec<Normal>,
     pub(super) information: DMatrix<f64>,
@@ -18,7 +18,7 @@ pub(super) struct System {
 }
 
 impl Search<'_> {
-    /// Coefficients less their prior means, then the constants of each flight less their prior means.
+    /// Deviations of the unknowns at `place` from their prior means: free coefficients, then the constants of each flight.
     pub(super) fn unknowns(&self, place: &Place) -> DVector<f64> {
         let coefficients = self.free.iter().zip(&place.theta).map(|(f, x)| x - f.prior);
         let mut all: Vec<f64> = coefficients.collect();
@@ -34,7 +34,7 @@ impl Search<'_> {
         SENSORS + self.asked.constants().len()
     }
 
-    /// Inverse prior variances of the unknowns.
+    /// Inverse prior variances of the unknowns, in the order of `unknowns`.
     pub(super) fn prior(&self) -> DVector<f64> {
         let constants = self.asked.constants();
         let mut all: Vec<f64> = self.free.iter().map(|f| f.width).collect();
@@ -45,7 +45,7 @@ impl Search<'_> {
         DVector::from_vec(all.iter().map(|sd| sd.powi(-2)).collect())
     }
 
-    /// Indices of the unknowns of a shot in `flight` among all unknowns.
+    /// Indices of the unknowns on which the shots of `flight` depend: all coefficients and the constants of this flight.
     pub(super) fn places(&self, flight: usize) -> Vec<usize> {
         let count = self.free.len();
         let size = self.of_flight();
@@ -93,7 +93,7 @@ impl Search<'_> {
         Ok(false)
     }
 
-    /// The damped step, limited by the coefficients' bounds and largest steps.
+    /// The damped step, limited by the bounds and the largest steps of the coefficients.
     fn solve(&self, system: &System, damping: f64) -> Result<DVector<f64>, AmendError> {
         let singular = || AmendError::Singular { model: self.base.name.clone() };
         let mut held: Vec<Option<f64>> = vec![None; system.gradient.len()];

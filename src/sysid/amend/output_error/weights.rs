@@ -1,12 +1,12 @@
-//! Weights of states and shots in a search, and the choice of its starting point.
+//! Weights of the states and the shots in a search, and the choice of its starting point.
 
 use super::Search;
 use crate::amend::normal::Place;
 use crate::amend::shooting;
 use greylag_num::statistics::{correlation_length, quantile};
 
-/// Smallest standard deviations of residuals, in the units of the state: the errors of the models' discrete steps and of the
-/// interpolated deflections without noise.
+/// Smallest standard deviations of residuals, in the units of the state. They cover the errors that remain without noise:
+/// those of discrete model steps and of interpolated deflections.
 const FLOOR: [f64; 8] = [5e-4, 5e-4, 0.01, 2e-3, 2e-3, 2e-3, 5e-4, 5e-4];
 /// A shot is down-weighted if its weighted mean square residual exceeds the median of all shots by this factor.
 const OUTLYING: f64 = 6.0;
@@ -15,8 +15,9 @@ impl Search<'_> {
     /// Sets the weights from the present residuals: inverse variance of each state divided by a common correlation length, and
     /// lower weights for outlying shots.
     ///
-    /// With separate correlation lengths, the iteration of the weights would have no useful fixed point. A state that drifts has
-    /// a longer correlation length and therefore a lower weight. It then drifts more, until the fit ignores this state.
+    /// With a separate correlation length for each state, the iteration would not converge to useful weights. A state that
+    /// drifts has a longer correlation length and therefore a lower weight. It then drifts more, until the fit ignores this
+    /// state.
     pub(super) fn reweigh(&mut self) {
         let residuals = self.residuals();
         let square = |r: &[[f64; 8]], k: usize| r.iter().map(|x| x[k] * x[k]).sum::<f64>();
@@ -41,8 +42,9 @@ impl Search<'_> {
         }
     }
 
-    /// Restarts at `given`, the coefficients of the model file, if shots of `length_s` (s) with them follow the flights more
-    /// closely than with the equation-error estimate. A kink of a table or a delayed sensor can bias the equation-error estimate.
+    /// Restarts at `given`, the coefficients of the model file, if they follow the flights more closely in shots of
+    /// `length_s` (s) than the equation-error estimate. A kink of a table or a delayed sensor can bias the equation-error
+    /// estimate.
     pub(super) fn start_from_the_closer(&mut self, given: &[f64], length_s: f64) {
         self.shots = shooting::cut(self.flights, length_s);
         self.place.starts = vec![[0.0; 8]; self.shots.len()];

@@ -5,7 +5,8 @@ use crate::compare::forecast::ForecastResult;
 use crate::compare::result::ModelResult;
 use crate::weak_form::prepared::Prepared;
 
-/// The answer about `models` over `flights`. The best forecast without aerodynamics is the baseline.
+/// The answer of a comparison of `models` on `flights`. The best of `forecasts`, which use no aerodynamics, is the
+/// baseline.
 pub fn between(
     models: &[ModelResult],
     flights: &[Prepared],
@@ -16,7 +17,7 @@ pub fn between(
         model: &model.name,
         scores: &model.free_run,
     });
-    // error at the longest horizon up to ANSWER_S that a run reaches, or else at the shortest one, as in the answer
+    // error at the horizon of the answer: the longest reached horizon up to ANSWER_S, or else the shortest reached horizon
     let error = |f: &ForecastResult| {
         let reached = || f.free_run.iter().filter(|s| s.runs > 0);
         let longest = reached()

@@ -1,5 +1,5 @@
-//! Short answer: change of the free-run error, the effects that were added, and the largest remaining error. Terminal,
-//! web page, workbench and JSON all show this answer.
+//! Short answer (summary) of a comparison, a diagnosis or an amendment: change of the free-run error, added effects, and
+//! largest remaining error. Terminal, web page, workbench and JSON all show this answer.
 
 pub(super) mod between;
 mod numbers;
@@ -17,12 +17,13 @@ pub const ANSWER_S: f64 = 5.0;
 /// An answer in sentences, with their numbers.
 #[derive(Clone, Debug, Serialize)]
 pub struct Answer {
-    /// Change of the free-run error with each step, and the flights on which the error was computed.
+    /// Sentence on the free-run error of each model, its change from model to model, and the flights on which it was
+    /// computed.
     pub error: String,
-    /// Effects with their most significant coefficients, and the state whose prediction improves most; empty if there are
-    /// neither.
+    /// Sentences on the added effects with their most significant coefficients, and on the state whose prediction improves
+    /// most; empty if there is neither.
     pub effect: String,
-    /// Largest remaining prediction error.
+    /// Sentence on the largest remaining prediction error.
     pub left: String,
     /// The recommended next command; empty if there is none.
     #[serde(skip_serializing_if = "String::is_empty")]
@@ -47,7 +48,7 @@ pub struct Stage<'a> {
 pub enum Seen {
     /// The flights of the fit are unknown.
     Unknown,
-    /// Number of the flights to which the model was fitted.
+    /// Some of the flights may have been fitted. The value is the number of fitted flights among them.
     Of(usize),
     /// The flights are the last third of a flight; the first two thirds were fitted.
     LastThird,
@@ -80,7 +81,7 @@ impl Answer {
         })
     }
 
-    /// The answer about `subject`.
+    /// The answer for the models and errors of `subject`.
     pub fn of(subject: &Subject) -> Answer {
         let numbers = Numbers::of(subject);
         Answer {
@@ -92,12 +93,12 @@ impl Answer {
         }
     }
 
-    /// The answer with `next` as the next command.
+    /// This answer with `next` as the recommended next command.
     pub fn then(self, next: String) -> Answer {
         Answer { next, ..self }
     }
 
-    /// The answer with `effect` as its sentence on effects, for example that none was asserted.
+    /// This answer with its sentence on effects replaced by `effect`, for example to say that no effect was found.
     pub fn with_effect(self, effect: String) -> Answer {
         Answer { effect, ..self }
     }
@@ -193,7 +194,8 @@ mod tests {
             "On 2 flights not fitted the error at 5 s falls from 0.0873 to 0.0234 by tuning (−73 %) and to 0.00083 with \
              drag_beta2 (another −96 %)."
         );
-        // the effect reduces the scaled error of airspeed most, from 0.05 to 0.002; sideslip keeps the largest, 0.0067
+        // the effect reduces the scaled error of airspeed most, from 0.05 to 0.002; the scaled error of sideslip, 0.0067,
+        // is then the largest
         assert_eq!(
             answer.effect,
             "drag_beta2 (drag rises with the square of sideslip): CDbeta2 = 0.991 (95 %: 0.986 to 0.997). With it the \

@@ -63,7 +63,8 @@ impl Decisive {
 
 /// The state whose root mean square error, relative to its scale x_c, decreases most.
 ///
-/// A last model with added effects is compared with the model before it, any other last model with the first one.
+/// If effects were added to the last model, it is compared with the model before it. Otherwise it is compared with the
+/// first model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct InUse {
     /// State with its unit, as in `State::NAMES`.
@@ -99,7 +100,7 @@ pub struct Numbers {
     pub horizon_s: f64,
     /// Names of the flights.
     pub flights: Vec<String>,
-    /// Number of these flights that a fit has used; `None` (null) if it is unknown.
+    /// Number of these flights to which a model was fitted; `None` (null) if it is unknown.
     pub fitted_flights: Option<usize>,
     /// Whether the flights are the last third of a flight whose first two thirds were fitted.
     pub last_third: bool,
@@ -171,7 +172,7 @@ fn horizon(stages: &[Stage]) -> Option<f64> {
     below.or_else(|| all.into_iter().min_by(f64::total_cmp))
 }
 
-/// The score at `horizon_s` if any run reaches it.
+/// The score at `horizon_s` (s); `None` if no run reaches this horizon or the error is not finite.
 fn score(scores: &[HorizonScore], horizon_s: f64) -> Option<&HorizonScore> {
     scores.iter().find(|s| s.horizon_s == horizon_s && s.runs > 0 && s.rmse_scaled.is_finite())
 }

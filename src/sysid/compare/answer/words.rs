@@ -1,8 +1,8 @@
-//! Wording of an answer's sentences, from its numbers.
+//! Wording of the sentences of an answer, from its numbers.
 
 use super::numbers::{Decisive, InUse, Left, Numbers, Step, Way};
 
-/// Sentence on the free-run error and its change with each step.
+/// Sentence on the free-run error and its change from model to model.
 pub fn error(n: &Numbers) -> String {
     let Some((first, rest)) = n.steps.split_first() else {
         return "No free run is long enough for an error to be given.".into();
@@ -54,7 +54,7 @@ pub fn error(n: &Numbers) -> String {
     text + "."
 }
 
-/// The error of a single model, beside that of the best forecast without aerodynamics.
+/// The error of a single model, compared with the error of the best forecast without aerodynamics.
 fn beside_baseline(n: &Numbers, error: f64) -> String {
     let text = format!(" is {}", number(error));
     let Some(b) = &n.baseline else { return text };
@@ -112,7 +112,7 @@ fn alike(value: f64, ci95: [f64; 2]) -> [String; 3] {
 fn in_use(n: &Numbers, used: &InUse, subject: &str) -> String {
     let (name, unit, factor) = people(used.state);
     let of = |x: f64| format!("{}{unit}", number(factor * x));
-    // a last model with effects is compared with the model before it
+    // if effects were added to the last model, it is compared with the model before it
     let before = match &n.steps[..] {
         [.., tuned, last] if last.way == Way::Effects && tuned.way == Way::Tuned => {
             " by tuning alone"
@@ -127,7 +127,7 @@ fn in_use(n: &Numbers, used: &InUse, subject: &str) -> String {
     )
 }
 
-/// Sentence on the largest remaining error; empty if there is no error. The error of a single model is no remainder.
+/// Sentence on the largest remaining error; empty if there is no error. For a single model, the word "left" is omitted.
 pub fn left(n: &Numbers) -> String {
     n.left.as_ref().map_or(String::new(), |Left { state, rmse }| {
         let (name, unit, factor) = people(state);
@@ -230,7 +230,7 @@ fn percent(p: f64) -> String {
     }
 }
 
-/// Three significant digits without zeros at the end, with a true minus sign.
+/// `x` with three significant digits, without zeros at the end, and with the minus sign U+2212.
 fn number(x: f64) -> String {
     let text = match x.abs() {
         0.0 => return "0".into(),

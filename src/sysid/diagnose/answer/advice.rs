@@ -6,7 +6,7 @@ use crate::diagnose::search::stepwise::Found;
 use crate::per_flight::askew;
 use greylag_physics::catalogue::describe;
 
-/// Largest number of recommendations for candidates whose evidence is near the threshold.
+/// Largest number of recommendations for candidates whose evidence is near the critical value.
 const UNSEEN: usize = 2;
 /// Manoeuvres for an effect whose file states none.
 const ONE_BY_ONE: &str = "flights that move its variables one by one, at two airspeeds";
@@ -76,7 +76,7 @@ fn designable(a: &str, b: &str) -> Option<[String; 2]> {
     [a, b].iter().all(|id| *id != askew::ID).then(|| [a.to_owned(), b.to_owned()])
 }
 
-/// The manoeuvres that separate the effect `id` from others. An effect file need not state them.
+/// Manoeuvres that distinguish the effect `id` from others. If its effect file states none, a general recommendation.
 fn separating(id: &str) -> String {
     let stated = describe(id).and_then(|a| a.entry).map_or("", |e| e.separated_by);
     (if stated.is_empty() { ONE_BY_ONE } else { stated }).to_owned()

@@ -1,4 +1,5 @@
-//! Curve of an effect's contribution over the regime variable that explains most of its variance.
+//! Curve of an effect's contribution over the flight variable (regime variable) that explains most of the
+//! contribution's variance.
 
 use crate::compare::{ChannelId, RegimeVariable};
 use crate::diagnose::answer::result::Curve;
@@ -14,10 +15,10 @@ const WIDTHS: usize = 24;
 const NOT_SHOWN: [RegimeVariable; 3] =
     [RegimeVariable::Altitude, RegimeVariable::Time, RegimeVariable::Flight];
 
-/// The curve of `contribution` (one entry a flight) in the first of `channels`.
+/// Computes the curve of `contribution` (one entry for each flight) in the first of `channels`.
 ///
-/// `relative` is the relative standard deviation of the contribution. `left` states whether the residual of the round still
-/// contains the contribution.
+/// `relative` is the relative standard deviation of the contribution. `left` states whether the residual of the round
+/// still contains the contribution. `None` if there is no channel or no window.
 pub fn curve(
     round: &Round,
     contribution: &[Column],
@@ -44,10 +45,12 @@ pub fn curve(
     over_the_best(id, made, scatter, &regimes, relative)
 }
 
-/// The curve of an effect in channel `id` over the regime variable that explains most of the contribution's variance.
+/// Computes the curve of an effect in the channel `id` over the regime variable that explains most of the
+/// contribution's variance.
 ///
-/// For each window, `made` is the contribution and `scatter` is measured − model without the effect, both in the channel's
-/// unit. `regimes` holds the windows' regime variables. `relative` is the relative standard deviation of the contribution.
+/// For each window, `made` is the contribution and `scatter` is measured − model without the effect, both in the
+/// channel's unit. `regimes` holds the windows' regime variables. `relative` is the relative standard deviation of the
+/// contribution.
 pub fn over_the_best(
     id: ChannelId,
     made: Vec<f64>,
@@ -105,7 +108,7 @@ fn over_the_range(y: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
     filled.map(|[x, y, count]| [x / count, y / count]).collect()
 }
 
-/// Share of the variance of `y` between bins over `x`.
+/// Share of the variance of `y` that lies between the bins over `x` (correlation ratio).
 fn explained(y: &[f64], x: &[f64]) -> f64 {
     let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
     let all: f64 = y.iter().map(|v| (v - mean).powi(2)).sum();

@@ -1,4 +1,5 @@
-//! Decoys: regression columns that cannot be effects, namely candidates reversed in time or with randomized phases.
+//! Placebo regressors (decoys), which cannot be effects: regressors of candidates, reversed in time or with random
+//! phases.
 
 use std::f64::consts::TAU;
 
@@ -15,13 +16,14 @@ use greylag_num::stream::{Stream, stream};
 
 /// Number of the random stream for the phases.
 const DECOYS: u64 = 84;
-/// Largest number of candidates from which decoys are made.
+/// Largest number of candidates from which placebo regressors are made.
 const MOST: usize = 6;
 /// Longest series, in windows, that is transformed at once. Longer series are randomized in pieces to limit the cost of the
 /// transform.
 const PIECE: usize = 256;
 
-/// The decoys of the best linear candidates of the last round, with their evidence.
+/// Makes placebo regressors from the best candidates of the last round that have a single coefficient. Returns their
+/// evidence.
 pub fn decoys(found: &Found, seed: u64) -> Vec<Decoy> {
     let round = found.round();
     let mut random = stream(seed, &[DECOYS]);
@@ -79,7 +81,7 @@ fn evidence(round: &Round, names: &[(String, Trial)], lists: &[Vec<Column>]) -> 
     names.iter().enumerate().filter_map(of).collect()
 }
 
-/// A series with the spectrum of `x` and random phases.
+/// Returns a series with the spectrum of `x` and random phases, piece by piece.
 fn shuffle(x: &[f64], random: &mut Stream) -> Vec<f64> {
     x.chunks(PIECE).flat_map(|piece| shuffle_piece(piece, random)).collect()
 }

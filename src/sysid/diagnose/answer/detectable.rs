@@ -1,9 +1,9 @@
-//! The smallest detectable amount of an effect.
+//! Minimum detectable effect: the smallest amount of each effect that the flights would show.
 //!
-//! For an effect that is linear in its coefficients, this amount follows from the standard deviations of the coefficients.
-//! The contribution of an effect on the inputs is not proportional to its amount near zero: a small lag is confounded with a
-//! clock error, and a small dead zone has no effect. Its contribution is therefore computed from the inputs of the flights at
-//! several amounts. All nuisance parameters are projected out at each amount.
+//! For an effect that is linear in its coefficients, this amount follows from the standard deviations of the
+//! coefficients. The contribution of an input effect is not proportional to its amount near zero: a small lag is
+//! confounded with a clock error, and a small dead zone has no effect. Its contribution is therefore computed at
+//! several amounts from the deflections of the flights. All nuisance parameters are projected out at each amount.
 
 use std::collections::BTreeMap;
 
@@ -16,19 +16,19 @@ use crate::diagnose::regression::rank::{Draw, Trial, deviations};
 use crate::diagnose::search::round::Round;
 use greylag_model::GreyBox;
 
-/// Largest number of amounts evaluated.
+/// Largest number of amounts that are evaluated for an effect.
 const TRIED: usize = 8;
 /// Largest factor between one amount and the next.
 const STRIDE: f64 = 8.0;
-/// Assumed exponent in evidence ∝ amountⁿ until two amounts have been evaluated.
+/// Exponent n in evidence ∝ amountⁿ that is assumed until two amounts have been evaluated.
 const POWER: f64 = 2.0;
-/// Smallest and largest exponent n that is derived from two amounts.
+/// Limits of the exponent n that is computed from two amounts.
 const POWERS: [f64; 2] = [0.5, 4.0];
-/// The search ends at an amount whose evidence differs from the required evidence by less than this share.
+/// The search ends if the ratio of the evidence to the required evidence differs from 1 by less than this value.
 const CLOSE: f64 = 0.1;
 
-/// For each candidate of `round`, the smallest amount of its first free coefficient, in the coefficient's unit, whose
-/// evidence exceeds `threshold` with a probability of five in six.
+/// Smallest detectable amounts of the candidates of `round`, by identifier. The amount is that of the first free
+/// coefficient, in its unit. An effect of this amount has evidence above `threshold` with a probability of five in six.
 ///
 /// Candidates without a detectable amount are left out.
 pub fn detectable(round: &Round, threshold: f64) -> BTreeMap<&'static str, f64> {
@@ -46,13 +46,13 @@ fn linear(round: &Round, trial: &Trial, threshold: f64) -> Option<f64> {
     amount.is_finite().then_some(amount)
 }
 
-/// Detectability of an effect's contribution in the noise.
+/// Quantities that determine which amount of an effect is detectable.
 struct Shown {
-    /// Standard deviation of the amount due to noise alone.
+    /// Standard deviation of the estimated amount due to white noise.
     alone: f64,
-    /// Ratio of the amount's standard deviation, derived from the scatter between blocks of the flights, to `alone`; at least 1.
+    /// Standard deviation of the amount that follows from the scatter between blocks, divided by `alone`; at least 1.
     scatter: f64,
-    /// Penalty on the evidence: ln n for each free coefficient, with n independent samples.
+    /// Penalty in the evidence: ln n for each free coefficient, with n independent samples.
     penalty: f64,
 }
 
@@ -64,8 +64,8 @@ impl Shown {
         Some(Shown { alone, scatter: (robust / alone).max(1.0), penalty })
     }
 
-    /// The amount, in units of `alone`, at which the gain and the Wald statistic both exceed `threshold` even if noise reduces
-    /// the estimate by one standard deviation.
+    /// The smallest detectable amount, in units of `alone`. Its penalised gain and its Wald statistic exceed
+    /// `threshold` even if noise reduces the estimate by one standard deviation.
     fn needed(&self, threshold: f64) -> f64 {
         let threshold = threshold.max(0.0);
         let by_gain = (threshold + self.penalty).sqrt();
@@ -73,21 +73,22 @@ impl Shown {
     }
 }
 
-/// Search for the smallest detectable amount of an effect on the deflections.
+/// Search for the smallest detectable amount of an effect on the deflections. A size is an amount, or its reciprocal if
+/// larger amounts are weaker effects.
 struct Sought<'a> {
     entry: &'a Entry,
     trial: &'a Trial,
-    /// Smallest and largest possible size.
+    /// Smallest and largest physically possible size.
     bounds: [f64; 2],
     size: f64,
-    /// The largest size that is not detectable, and the ratio of its evidence to the required evidence.
+    /// A size that is not detectable, and the ratio of its evidence to the required evidence.
     hidden: Option<[f64; 2]>,
-    /// The smallest size that is detectable, and the ratio of its evidence to the required evidence.
+    /// A size that is detectable, and the ratio of its evidence to the required evidence.
     seen: Option<[f64; 2]>,
     /// The size evaluated last, and the ratio of its evidence to the required evidence.
     last: Option<[f64; 2]>,
     found: Option<f64>,
-    /// Whether the model cannot take the effect at the present size, which ends the search.
+    /// Whether the effect of the present size cannot be added to the model, which ends the search.
     refused: bool,
 }
 
@@ -112,7 +113,7 @@ impl<'a> Sought<'a> {
         Some(sought)
     }
 
-    /// Converts an amount to a size, or a size to an amount. The size grows with the strength of the effect: it equals the
+    /// Converts an amount to a size, or a size to an amount. A larger size is a stronger effect. The size equals the
     /// amount, except for a limit (on a rate, for example), for which it is 1/amount.
     fn turned(&self, x: f64) -> f64 {
         let starts = self.entry.about.entry.map_or(&[][..], |e| e.starts);
@@ -120,7 +121,7 @@ impl<'a> Sought<'a> {
         if falls { x.recip() } else { x }
     }
 
-    /// Records the `ratio` of the evidence at the present size to the required evidence, and chooses the next size.
+    /// Records `ratio`, the evidence at the present size divided by the required evidence. Then chooses the next size.
     fn tried(&mut self, ratio: f64) {
         if (ratio - 1.0).abs() < CLOSE {
             self.found = Some(self.size);
@@ -148,7 +149,7 @@ impl<'a> Sought<'a> {
         self.size = next.clamp(self.bounds[0], self.bounds[1]);
     }
 
-    /// The best estimate of the smallest detectable amount; `None` if no evaluated size is detectable.
+    /// Smallest detectable amount as far as it has been found; `None` if no evaluated size is detectable.
     fn amount(&self) -> Option<f64> {
         let size = self.found.or(self.seen.map(|[size, _]| size))?;
         Some(self.turned(size))
@@ -182,8 +183,8 @@ fn operators(round: &Round, threshold: f64) -> Vec<(&'static str, f64)> {
     sought.iter().filter_map(|s| Some((s.trial.id, s.amount()?))).collect()
 }
 
-/// Ratio of the evidence to the required evidence for each of `sought` at its present size; `None` for an effect that the
-/// model cannot take.
+/// For each effect of `sought`, the evidence at its present size divided by the required evidence. An entry is `None`
+/// if the effect cannot be added to the model. The result is `None` if the regression fails.
 fn ratios(round: &Round, threshold: f64, sought: &[&Sought]) -> Option<Vec<Option<f64>>> {
     let mut joined = Vec::with_capacity(sought.len());
     for s in sought {
@@ -193,7 +194,7 @@ fn ratios(round: &Round, threshold: f64, sought: &[&Sought]) -> Option<Vec<Optio
     of_those(joined, |joined| ratios_of(round, threshold, joined))
 }
 
-/// Results of `evaluate` for those of `all` that are there, in their places.
+/// Evaluates the entries of `all` that are not `None`. The results keep their places; the other places are `None`.
 fn of_those<T>(
     all: Vec<Option<T>>,
     evaluate: impl FnOnce(&[T]) -> Option<Vec<f64>>,
@@ -205,7 +206,8 @@ fn of_those<T>(
     Some(there.into_iter().map(|there| if there { results.next() } else { None }).collect())
 }
 
-/// Ratio of the evidence to the required evidence for each effect, given with the model that has it.
+/// Evidence divided by the required evidence, for each effect of `sought`. The model of a pair contains the effect.
+/// `None` if the regression fails.
 fn ratios_of(round: &Round, threshold: f64, sought: &[(&Sought, GreyBox)]) -> Option<Vec<f64>> {
     let na = round.known.len();
     let last = na + sought.len();
@@ -233,7 +235,8 @@ mod tests {
     use super::*;
     use greylag_physics::inputs::Kind;
 
-    /// Result of the search for the effect `id`, if its evidence is a power of its size and sufficient at `amount`.
+    /// Result of the search for the effect `id` if the ratio of its evidence to the required evidence is a power of its
+    /// size and reaches 1 at `amount`.
     fn sought(id: &str, amount: f64, power: f64) -> Option<f64> {
         let entry = Entry { about: Kind::from_id(id)?.describe(), operator: true };
         let id = entry.about.id;

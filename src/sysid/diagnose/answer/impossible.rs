@@ -5,8 +5,8 @@ use crate::diagnose::answer::sentences::with_interval;
 use crate::flight_path::reconstruction::{Nuisance, Reconstruction};
 use greylag_num::statistics::mean;
 
-/// Range of airspeed scales (measured / true) of a working pitot tube. A badly placed static port causes errors of 10 to
-/// 15 %.
+/// Range of airspeed scales (measured / true) of a working pitot tube. A badly placed static port causes errors of 10
+/// to 15 %.
 const SCALES: [f64; 2] = [0.8, 1.25];
 /// Largest plausible mean vertical wind over a flight, m/s. The mean over the up- and downdraughts of thermals is small.
 const VERTICAL_MPS: f64 = 3.0;
@@ -14,7 +14,7 @@ const VERTICAL_MPS: f64 = 3.0;
 const BELIEVED: f64 = 6.0;
 /// Number of standard deviations by which an estimate must exceed a limit to count as impossible.
 const SURELY: f64 = 4.0;
-/// Share of the prior mean below which a lift slope is implausible.
+/// A lift slope below this share of its prior mean is implausible.
 const NO_WING: f64 = 0.2;
 
 /// A sentence for each impossible estimate, with advice on what to check.

@@ -1,10 +1,11 @@
-//! Significant sensor errors and wind, from the estimates of the reconstruction, which uses no aerodynamics.
+//! Sensor errors and wind of each flight, as estimated by the flight-path reconstruction without aerodynamics.
 
 use crate::diagnose::answer::result::Measurement;
 use crate::flight_path::reconstruction::{Nuisance, Reconstruction};
 
-/// Kinds of constants: prefix of the name, identifier in the catalogue, nominal value, largest negligible deviation in the
-/// constant's unit. A negligible deviation is within the errors of the reconstruction, or of the size of a trim.
+/// Kinds of constants: prefix of the name, identifier in the catalogue, nominal value, and largest negligible deviation
+/// from it in the constant's unit. A negligible deviation is no larger than the errors of the reconstruction or a usual
+/// trim.
 const KINDS: [(&str, &str, f64, f64); 15] = [
     ("gyro_bias", "imu_bias", 0.0, 0.005),
     ("gyro_drift", "imu_bias", 0.0, 5e-5),
@@ -25,10 +26,10 @@ const KINDS: [(&str, &str, f64, f64); 15] = [
 /// Number of standard deviations beyond which a constant differs from its nominal value.
 const CLEARLY: f64 = 4.0;
 
-/// Sensor errors and wind of each flight.
+/// Returns the sensor errors and the wind of each flight.
 ///
-/// A delay of the actuators is never asserted here: it may be a property of the aircraft. The search for effects decides on
-/// it.
+/// A delay of the actuator record is never asserted here, because it may be a property of the aircraft. The search for
+/// effects decides on it.
 pub fn measurement(flights: &[&Reconstruction]) -> Vec<Measurement> {
     let of = |flight: &&Reconstruction| {
         let name = flight.name.clone();

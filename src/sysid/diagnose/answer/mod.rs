@@ -1,4 +1,4 @@
-//! The answer: verdict, ranking, intervals, and the sentences that state them.
+//! The result of a diagnosis: verdict, ranking, confidence intervals, and sentences that state them.
 
 pub(super) mod advice;
 pub(super) mod curves;

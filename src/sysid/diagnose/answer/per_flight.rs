@@ -1,4 +1,5 @@
-//! Constants of each flight that are fitted together with the aerodynamics: trims, and misalignment of the measured axes.
+//! Constants of each flight that are estimated together with the aerodynamics: trims, and misalignment angles of the
+//! sensors.
 
 use std::collections::HashSet;
 
@@ -10,10 +11,10 @@ use crate::diagnose::search::round::Round;
 use crate::per_flight::{Constant, askew};
 use greylag_num::statistics::correlation_length;
 
-/// Number of standard deviations beyond which a constant differs from zero.
+/// A constant is significant if it differs from zero by more than this number of standard deviations.
 const CLEARLY: f64 = 4.0;
-/// Number of prior standard deviations beyond which a constant is implausible. It then probably compensates for a missing
-/// effect.
+/// A constant is implausible if it differs from zero by more than this number of prior standard deviations. It then
+/// probably compensates for a missing effect.
 const BELIEVED: f64 = 3.0;
 /// Largest misalignment within the accuracy of mounting, rad.
 const MOUNTED: f64 = 0.5 * std::f64::consts::PI / 180.0;
@@ -87,8 +88,8 @@ impl Fitted {
     }
 }
 
-/// Flights with an implausible constant, for which nothing is asserted. The constant compensates for another cause, and the
-/// constants correlated with it are not reliable.
+/// Flights with an implausible constant. No constant of these flights is asserted: the implausible constant compensates
+/// for another cause, and the constants correlated with it are not reliable.
 fn astray(fitted: &[Fitted]) -> HashSet<String> {
     fitted.iter().filter(|f| f.is_implausible()).map(|f| f.flight.clone()).collect()
 }
@@ -107,7 +108,8 @@ fn fitted(round: &Round) -> Vec<Fitted> {
         let places: Vec<usize> = (0..flights).map(|k| place(k, which)).collect();
         let own = places[flight];
         let share = 1.0 / flights as f64;
-        // the mean over all flights is confounded with the model's coefficient: differences from the mean are more certain
+        // the mean over all flights is confounded with the model's coefficient: differences from this mean are more
+        // certain
         let weights: Vec<f64> =
             (0..flights).map(|k| f64::from(u8::from(k == flight)) - share).collect();
         let pairs = places.iter().zip(&weights);
@@ -132,11 +134,11 @@ fn fitted(round: &Round) -> Vec<Fitted> {
         .collect()
 }
 
-/// Robust covariance of the known parameters by a sandwich estimate. The weight of a row is the residual's mean square times
-/// its correlation length in the same flight and channel.
+/// Robust covariance of the nuisance parameters by a sandwich estimate. Each row is weighted by the residual's mean
+/// square times its correlation length in the same flight and channel.
 ///
-/// The whitening of the noise is common to all flights for each channel. It underestimates the uncertainty in a flight whose
-/// residual is larger or slower than in the others.
+/// The noise of a channel is whitened in the same way in all flights. In a flight with a larger or slower residual than
+/// the others, this would underestimate the uncertainty.
 fn sandwich(round: &Round) -> DMatrix<f64> {
     let p = &round.projected;
     let count = round.known.len();
@@ -168,8 +170,8 @@ fn sandwich(round: &Round) -> DMatrix<f64> {
     &p.covariance * meat * &p.covariance
 }
 
-/// Ratio of the flight's residual to its noise, at least 1. If an effect is missing, estimates are less certain than the
-/// noise suggests.
+/// Root mean square of the flight's whitened residual; at least 1, the value for noise. If an effect is missing,
+/// estimates are less certain than the noise suggests.
 fn misfit(round: &Round, flight: usize) -> f64 {
     let of = round.projected.by_channel.iter().zip(&round.cells.flight_of_block);
     let own = of.filter(|(_, of)| **of == flight).flat_map(|(channels, _)| channels);
@@ -177,7 +179,7 @@ fn misfit(round: &Round, flight: usize) -> f64 {
     (square / rows.max(1) as f64).max(1.0).sqrt()
 }
 
-/// Significantly misaligned axes, a sentence for each flight.
+/// Sentences on significant misalignment angles, one for each flight.
 pub fn askew_sentences(measurement: &[Measurement]) -> Vec<String> {
     let turned = measurement.iter().filter(|m| m.id == askew::ID && m.asserted).map(|m| {
         let about = m.name.trim_start_matches("askew_");
@@ -193,7 +195,7 @@ pub fn askew_sentences(measurement: &[Measurement]) -> Vec<String> {
     by_flight(turned).into_iter().map(one).collect()
 }
 
-/// Significantly different trims, a sentence for each flight.
+/// Sentences on trims that differ significantly between flights, one for each flight.
 pub fn trim_sentences(trims: &[FlightTrim]) -> Vec<String> {
     let trims = trims.iter().filter(|t| t.asserted).filter_map(|t| {
         let [by, sd] = t.beside_mean?;

@@ -1,4 +1,4 @@
-//! The list of candidates: asserted ones first, then by evidence.
+//! List of candidate effects with the results of their checks.
 
 use std::collections::BTreeMap;
 
@@ -15,12 +15,12 @@ use crate::diagnose::search::stepwise::{Found, Selected};
 use greylag_physics::catalogue::describe;
 use greylag_physics::effects::Description;
 
-/// Number of runners-up that get a curve.
+/// Number of candidates that get a curve although they were not selected.
 const RUNNERS_UP: usize = 2;
 /// Half width of a 95 % interval in standard deviations.
 const INTERVAL: f64 = 1.96;
 
-/// The results of all candidates, in the order of the list.
+/// Results of all candidates: first the asserted effects, then the refused ones, then all others by rank.
 pub fn candidates(found: &Found, options: &Options) -> Vec<Candidate> {
     let (asserted, refused): (Vec<&Selected>, Vec<&Selected>) =
         found.selected.iter().partition(|s| s.refused.is_empty());
@@ -58,8 +58,8 @@ pub fn candidates(found: &Found, options: &Options) -> Vec<Candidate> {
     list
 }
 
-/// Ids of asserted effects whose constants may all be zero (95 %) in the joint fit of all effects, because another
-/// effect accounts for the same residual. Shape constants do not count.
+/// Ids of asserted effects whose coefficients may all be zero (95 %) in the joint fit of all effects, because another
+/// effect explains the same residual. Shape constants (nonlinear coefficients) do not count.
 pub fn void(found: &Found, options: &Options) -> Vec<String> {
     let lean = Options { detail: Detail::Lean, ..options.clone() };
     let asserted = found.selected.iter().filter(|s| s.refused.is_empty());
@@ -72,7 +72,7 @@ pub fn void(found: &Found, options: &Options) -> Vec<String> {
     candidates.filter(may_be_zero).map(|c| c.id).collect()
 }
 
-/// Smallest detectable amounts. Effects that have joined the model keep the amounts of the first round.
+/// Smallest detectable amounts by effect. Effects that were added to the model keep the amounts of the first round.
 fn least(found: &Found) -> BTreeMap<&'static str, f64> {
     let mut least = detectable(&found.first, found.threshold);
     if let Some(last) = &found.last {
@@ -131,8 +131,8 @@ fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate>
     })
 }
 
-/// Value of a coefficient that has joined the model, and its standard deviations due to noise and due to the
-/// discretisation.
+/// Value of the coefficient `name` of the added effect `id`, and its standard deviations due to noise and due to
+/// discretisation. `None` if the model does not contain it.
 fn fitted(found: &Found, id: &str, name: &str) -> Option<[f64; 3]> {
     let round = found.round();
     let full = format!("{id}.{name}");
@@ -151,7 +151,7 @@ fn fitted(found: &Found, id: &str, name: &str) -> Option<[f64; 3]> {
 
 fn open(found: &Found, trial: &Trial, score: &Score, about: &Description) -> Candidate {
     let round = found.round();
-    // below the chance level, the estimates by flight are noise
+    // below the critical value, the estimates by flight are noise
     let by_flight = match score.evidence > found.threshold {
         true => checks::by_flight(round, trial, score),
         false => Vec::new(),

@@ -10,7 +10,7 @@ use crate::per_flight::PerFlight;
 pub enum Verdict {
     /// At least one effect is asserted.
     Effect,
-    /// The tuned model explains the data; nothing more is needed.
+    /// The re-estimated model explains the flights without further effects.
     Adequate,
     /// Something is missing, but no effect of the catalogue explains it.
     Unexplained,
@@ -22,17 +22,17 @@ pub enum Verdict {
 
 /// The result of a diagnosis of one model over one or several flights.
 ///
-/// It is plain data: [`diagnose`](crate::diagnose::diagnose) computes it whole and nothing changes it later. Read
-/// `verdict` first, then `doubtful`: if that is not empty, figures of the flights are physically impossible,
-/// `verdict` is [`Verdict::Unknown`] and no effect is asserted. Then read `effects`, whose `asserted` entries stand
-/// first in the order of selection. `sentences` state the same results in words, the most important first. The
-/// optional parts are filled as the options requested them: `trims` and the axes' angles in `measurement` if
-/// constants of each flight were estimated, `decoys` and the candidates' curves with
+/// Read `verdict` first, then `doubtful`. If `doubtful` is not empty, estimates from the flights are physically
+/// impossible, `verdict` is [`Verdict::Unknown`], and no effect is asserted. Then read `effects`: its `asserted`
+/// entries come first, in the order of selection. `sentences` state the same results in words.
+///
+/// Some parts depend on the options. `trims`, and the misalignment angles in `measurement`, are filled if constants of
+/// each flight were estimated. `decoys` and the candidates' curves are filled with
 /// [`Detail::Full`](crate::diagnose::Detail::Full).
 ///
-/// Units are SI and stand beside the values; channels D, L, Y are forces (N), l, m, n moments (N m). A number that does
-/// not exist is NaN, which JSON writes as `null`. Flights are named by their file. For equal inputs, options and version
-/// the result is equal, since `settings.seed` determines all random draws.
+/// Values are in SI units unless a `unit` is given. The channels D, L, Y are forces (N); l, m, n are moments (N m). A
+/// number that does not exist is NaN, which JSON writes as `null`. Flights are named after their file. Equal inputs,
+/// options and versions give equal results, because `settings.seed` determines all random draws.
 #[derive(Clone, Debug, Serialize)]
 pub struct Diagnosis {
     /// Schema of the document, `greylag.diagnosis/1`.
@@ -43,30 +43,30 @@ pub struct Diagnosis {
     pub model: String,
     /// Overall verdict on the model.
     pub verdict: Verdict,
-    /// The answer in plain sentences, the most important first.
+    /// The result in plain sentences, the most important first.
     pub sentences: Vec<String>,
-    /// Physically impossible figures, in words; if there are any, forces and moments are not judged.
+    /// Physically impossible estimates, in words. If there are any, forces and moments are not assessed.
     pub doubtful: Vec<String>,
-    /// Every candidate, asserted ones first in the order of their selection, then by evidence.
+    /// Every candidate: the asserted ones first, in the order of their selection, then the others by evidence.
     pub effects: Vec<Candidate>,
-    /// Unexplained share of each channel under the tuned model with the asserted effects.
+    /// Unexplained share of each channel under the re-estimated model with the added effects.
     pub channels: Vec<ChannelLeft>,
-    /// Sensor errors and wind of each flight, estimated without any aerodynamics; misalignment of the axes
-    /// (`axes_askew`), estimated with the aerodynamics, where it was requested.
+    /// Sensor errors and wind of each flight, estimated without aerodynamics. If requested, also misalignment angles of
+    /// the axes (`axes_askew`), estimated together with the aerodynamics.
     pub measurement: Vec<Measurement>,
     /// Trims of each flight, where they were estimated.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub trims: Vec<FlightTrim>,
-    /// The model's own coefficients as tuned with the asserted effects in the model.
+    /// The model's own coefficients, re-estimated with the added effects in the model.
     pub tuned: Vec<Tuned>,
     /// Advice on the next flight, the most useful first.
     pub advice: Vec<Advice>,
-    /// Evidence in the null flights, in which no effect is missing; it determines the thresholds.
+    /// Evidence in bootstrap draws under the null hypothesis. It determines the critical values.
     pub nulls: Nulls,
-    /// Decoy regressors, as a check on false detections.
+    /// Placebo regressors (decoys), which check for false detections.
     pub decoys: Vec<Decoy>,
-    /// Share of the residual's variance beyond noise that a flexible model, trained on the other flights, could still
-    /// remove after the asserted effects; NaN (null) if it was not computed.
+    /// Share of the residual variance beyond noise that a flexible model could still remove after the asserted effects.
+    /// The flexible model is fitted to the other flights.
     pub learnable_remainder: f64,
     /// Further notes for the reader.
     pub notes: Vec<String>,
@@ -85,10 +85,10 @@ pub struct Candidate {
     pub asserted: bool,
     /// Classification of the evidence.
     pub status: Status,
-    /// The smaller of penalised gain and block-robust Wald statistic, in the round that selected the effect; for a
-    /// candidate that was not selected, in the last round.
+    /// Evidence: the smaller of the penalised likelihood gain and the block-robust Wald statistic. It comes from the
+    /// round that selected the effect, or from the last round if the effect was not selected.
     pub evidence: f64,
-    /// Evidence that chance reaches in the null flights.
+    /// Critical value of the evidence, from bootstrap draws under the null hypothesis that no effect is missing.
     pub threshold: f64,
     /// Parameters of the effect, fitted together with the model's own coefficients.
     pub parameters: Vec<Parameter>,
@@ -96,18 +96,20 @@ pub struct Candidate {
     pub channels: Vec<String>,
     /// Ids of effects that these data cannot distinguish from this effect.
     pub indistinguishable_from: Vec<String>,
-    /// Relative reduction of the error on segments that the fit did not use; NaN (null) if not computed.
+    /// Share of the residual variance beyond noise that the effect removes from blocks that the fit did not use; NaN
+    /// (null) if not computed.
     pub heldout_error_reduction: f64,
-    /// Share of block bootstraps in which it is selected first; NaN (null) if not computed.
+    /// Share of block bootstraps in which the effect ranks first; NaN (null) if not computed.
     pub selected_in_bootstraps: f64,
     /// Estimate of the first parameter from each flight alone.
     pub by_flight: Vec<FlightEstimate>,
-    /// Smallest amount of the first parameter that these data would have shown, in its unit.
+    /// Smallest amount of the first parameter that these flights would have shown, in its unit; `None` if there is no
+    /// such amount.
     pub minimum_detectable: Option<f64>,
-    /// Reasons not to assert it although its evidence exceeds the threshold.
+    /// Reasons not to assert the effect although its evidence exceeds the critical value.
     pub refused: Vec<String>,
-    /// Its contribution over the regime variable that explains most of its variance. `None` for candidates of low rank
-    /// and with [`Detail::Lean`](crate::diagnose::Detail::Lean).
+    /// The effect's contribution over the flight variable that explains most of its variance. `None` for candidates of
+    /// low rank and with [`Detail::Lean`](crate::diagnose::Detail::Lean).
     pub curve: Option<Curve>,
 }
 
@@ -117,26 +119,26 @@ pub struct Candidate {
 pub enum Status {
     /// The model lacks this effect.
     Missing,
-    /// The model lacks this effect or one that these flights cannot distinguish from it.
+    /// The model lacks this effect, or another effect that these flights cannot distinguish from it.
     Indistinguishable,
     /// The effect is significant but too small to matter in these flights.
     Small,
-    /// The evidence exceeds the threshold, but a further check failed.
+    /// The evidence exceeds the critical value, but a further check failed.
     Refused,
-    /// The evidence is below the threshold.
+    /// The evidence is below the critical value.
     NotShown,
 }
 
 /// A fitted parameter of a candidate.
 #[derive(Clone, Debug, Serialize)]
 pub struct Parameter {
-    /// Name in model files.
+    /// Name of the coefficient in model files.
     pub name: String,
-    /// Estimate, in `unit`.
+    /// Estimated value, in the unit `unit`.
     pub value: f64,
     /// 95 % interval of `value`.
     pub ci95: [f64; 2],
-    /// Unit of `value`, with the parameter's meaning.
+    /// Unit of `value`; it may include the parameter's meaning.
     pub unit: String,
     /// Estimate from each flight alone; empty if it was not computed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -154,22 +156,22 @@ pub struct FlightEstimate {
     pub sd: f64,
 }
 
-/// An effect's contribution over a regime variable, with the scatter that it explains.
+/// An effect's contribution over a flight variable (regime variable), with the residual that it explains.
 #[derive(Clone, Debug, Serialize)]
 pub struct Curve {
     /// Name of the channel: D, L, Y, l, m or n.
     pub channel: String,
-    /// Name of the regime variable with its unit.
+    /// Name of the flight variable, with its unit.
     pub variable: String,
     /// Unit of the channel.
     pub unit: String,
-    /// Value of the variable at each window.
+    /// Value of the flight variable in each window.
     pub x: Vec<f64>,
-    /// Measured less the tuned model without the effect, at each window.
+    /// Measured value minus the prediction of the re-estimated model without the effect, in each window.
     pub residual: Vec<f64>,
-    /// Values of the variable at which the contribution is given.
+    /// Values of the flight variable at which the contribution is given.
     pub at: Vec<f64>,
-    /// Mean contribution there, with lower and upper end of its 95 % interval.
+    /// Mean contribution at these values, with the lower and upper end of its 95 % interval.
     pub contribution: Vec<[f64; 3]>,
 }
 
@@ -178,17 +180,18 @@ pub struct Curve {
 pub struct ChannelLeft {
     /// Name of the channel: D, L, Y, l, m or n.
     pub channel: String,
-    /// Unexplained share of the variance beyond sensor noise under the tuned model.
+    /// Unexplained share of the channel's variance beyond sensor noise, under the re-estimated model without effects.
     pub tuned_unexplained_fraction: f64,
-    /// The same share with the asserted effects.
+    /// The same share under the re-estimated model with the added effects.
     pub unexplained_fraction: f64,
-    /// The worst regime in one sentence, where there is one.
+    /// Flight condition with the most significant mean residual, in words; `None` if no mean residual is significant.
     pub worst_regime: Option<String>,
-    /// The product of states that correlates most with the remaining residual, if that exceeds chance.
+    /// Product of states or deflections that explains most of the remaining residual; `None` if this is not
+    /// significant.
     pub left_with: Option<String>,
     /// Whether these flights do not suffice to assess the given model in this channel.
     pub abstained: bool,
-    /// Reason for abstaining, if `abstained`.
+    /// Reason why the channel cannot be assessed, if `abstained`.
     pub why_abstained: Option<String>,
 }
 
@@ -201,17 +204,17 @@ pub struct Measurement {
     pub id: String,
     /// Name of the constant.
     pub name: String,
-    /// Estimate, in `unit`.
+    /// Estimated value, in the unit `unit`.
     pub value: f64,
     /// Standard deviation of `value`.
     pub sd: f64,
-    /// Unit of `value`.
+    /// Unit of the estimate `value`.
     pub unit: String,
-    /// Whether it differs significantly from its nominal value.
+    /// Whether the constant differs significantly from its nominal value.
     pub asserted: bool,
 }
 
-/// A trim of one flight, relative to what all flights have in common.
+/// A trim coefficient of one flight, as a difference from the model's coefficient.
 #[derive(Clone, Debug, Serialize)]
 pub struct FlightTrim {
     /// Name of the flight.
@@ -224,28 +227,28 @@ pub struct FlightTrim {
     pub value: f64,
     /// Standard deviation of `value`, the uncertainty of the model's own coefficient included.
     pub sd: f64,
-    /// Estimate less the mean of all flights, and its standard deviation; `None` for a single flight.
+    /// Estimate minus the mean of all flights, and its standard deviation; `None` for a single flight.
     pub beside_mean: Option<[f64; 2]>,
-    /// Whether it differs significantly from the mean by a plausible amount.
+    /// Whether the trim differs significantly from the mean of all flights, by a plausible amount.
     pub asserted: bool,
 }
 
-/// A tuned coefficient of the model.
+/// A re-estimated coefficient of the model.
 #[derive(Clone, Debug, Serialize)]
 pub struct Tuned {
     /// Name, `effect.coefficient`, as in the model file.
     pub name: String,
     /// Value in the model file.
     pub prior: f64,
-    /// Prior standard deviation.
+    /// Prior standard deviation of the coefficient.
     pub prior_sd: f64,
-    /// Value after tuning.
+    /// Value after the re-estimation, from data and prior.
     pub value: f64,
     /// Posterior standard deviation of `value`.
     pub sd: f64,
 }
 
-/// A manoeuvre to fly next, with its reason.
+/// A manoeuvre recommended for the next flight, with the reason.
 #[derive(Clone, Debug, Serialize)]
 pub struct Advice {
     /// The manoeuvre, in words.
@@ -256,34 +259,34 @@ pub struct Advice {
     pub between: Option<[String; 2]>,
 }
 
-/// Null flights, which determine the thresholds. Each is the set of flights under the tuned model with the noise of the
-/// richest fit. The sign of this noise is drawn at random block by block, and errors of the coefficients are drawn from
-/// their prior.
+/// Bootstrap draws under the null hypothesis that no effect is missing, which determine the critical values. Each draw
+/// consists of the flights under the re-estimated model with resampled noise: the sign of the noise is random in each
+/// block. Errors of the coefficients are drawn from their prior.
 #[derive(Clone, Debug, Serialize)]
 pub struct Nulls {
-    /// Number of null flights.
+    /// Number of bootstrap draws.
     pub count: usize,
-    /// Largest evidence over the candidates in each, ascending.
+    /// Evidence of the best candidate in each draw, ascending.
     pub best: Vec<f64>,
-    /// Significance level of the thresholds.
+    /// Significance level of the critical values.
     pub level: f64,
 }
 
-/// A column that cannot be an effect.
+/// A placebo regressor (decoy), which cannot be an effect.
 #[derive(Clone, Debug, Serialize)]
 pub struct Decoy {
-    /// Construction of the decoy, for example `drag_alpha2 reversed in time`.
+    /// Construction of the regressor, for example `drag_alpha2 reversed in time`.
     pub name: String,
-    /// Evidence that it reaches.
+    /// Evidence that the regressor reaches.
     pub evidence: f64,
 }
 
 /// Settings of a diagnosis.
 #[derive(Clone, Debug, Serialize)]
 pub struct Settings {
-    /// Seed of null flights, bootstraps and decoys.
+    /// Seed of all random draws of the diagnosis.
     pub seed: u64,
-    /// Number of null flights.
+    /// Number of bootstrap draws under the null hypothesis.
     pub nulls: usize,
     /// Number of block bootstraps.
     pub bootstraps: usize,

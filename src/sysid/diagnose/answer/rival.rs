@@ -1,10 +1,10 @@
-//! Misaligned measured axes as a rival explanation of the residual.
+//! Test whether misaligned axes of the sensors explain the residual better than missing effects.
 //!
 //! A board pitched by 3° turns part of every roll into yaw, as a product of inertia does, and part of lift into drag.
-//! Kinematics cannot show the misalignment, because it rotates all quantities that the board measures equally. It is
-//! therefore tested with the aerodynamics. After effects were found, the search is repeated with free misalignment
-//! angles and the same noise. The Bayesian information criterion compares both explanations: their residuals and their
-//! numbers of constants.
+//! The flight-path reconstruction cannot show the misalignment, because all quantities that the board measures rotate
+//! equally. The test therefore uses the aerodynamics. If the model is not adequate, the search is repeated with free
+//! misalignment angles. The Bayesian information criterion compares both explanations under the same noise: their
+//! residuals and their numbers of constants.
 
 use crate::diagnose::answer::result::Verdict;
 use crate::diagnose::answer::run::verdict;
@@ -20,11 +20,12 @@ use greylag_model::GreyBox;
 
 /// Prior standard deviation of each misalignment angle, °: a board mounted by eye.
 const MOUNTED_DEG: f64 = 3.0;
-/// The second search is made only if the angles remove at least this share of the error that the best effect removes.
+/// The second search is made only if the angles reduce the residual by at least this share of the best effect's
+/// reduction.
 const WORTH: f64 = 0.3;
 
-/// The better explanation of the flights of `problem`: `found`, or one with misaligned axes. If both are equally
-/// good, the effects of `found` are marked as indistinguishable from misaligned axes.
+/// Returns the better explanation of the flights of `problem`: `found`, or a search result with misaligned axes. If
+/// both are equally good, the effects of `found` are marked as indistinguishable from misaligned axes.
 ///
 /// # Errors
 /// As [`search`].
@@ -53,8 +54,8 @@ pub fn against_axes(
     Ok(found)
 }
 
-/// The problem with free misalignment angles. `None` if no effect is missing or if the angles remove too little of the
-/// residual.
+/// Returns the problem with free misalignment angles. `None` if the angles are free already, if no effect is missing,
+/// or if the angles remove too little of the residual.
 fn worth(problem: &Problem, found: &Found) -> Option<Problem> {
     if problem.per_flight.askew_deg.is_some() || verdict(found) == Verdict::Adequate {
         return None;
@@ -76,7 +77,8 @@ fn left(round: &Round) -> f64 {
     round.projected.total[(last, last)]
 }
 
-/// Sum of squares that `of` leaves under the noise of `first`, plus the penalty of its constants.
+/// Bayesian information criterion of the result `of`: residual sum of squares with the noise of `first`, plus the
+/// penalty for its constants. `None` if the model cannot be linearised.
 fn cost(problem: &Problem, first: &Found, of: &Found) -> Option<f64> {
     let model = of.round().tuned();
     let given = of.first.model.coefficients().len();

@@ -1,4 +1,4 @@
-//! The diagnosis, from flights to the result.
+//! The diagnosis: prepares the flights, runs the search, and assembles the result.
 
 use crate::compare::{self, ChannelId, unpredicted};
 use crate::diagnose::answer::advice;
@@ -29,21 +29,21 @@ use crate::weak_form::windows::{self, Series};
 use greylag_model::{GreyBox, RUDDER};
 use greylag_physics as physics;
 
-/// Smallest learnable share of the error beyond noise for the verdict that something is missing; reconstruction errors
-/// stay below it.
+/// The verdict is that something is missing only if a flexible model could remove more than this share of the residual
+/// beyond noise. Errors of the reconstruction stay below it.
 const WORTH_SAYING: f64 = 0.1;
-/// The same threshold after a catalogue effect was refused for a reason other than its small size.
+/// Smaller threshold that applies if an effect of the catalogue was refused for another reason than its small size.
 const REFUSED: f64 = 0.01;
-/// Reason for refusing every effect when any figure is physically impossible.
+/// Reason to refuse every effect if an estimate is physically impossible.
 const CANNOT_BE: &str =
     "a figure of these flights cannot be, so that nothing is said about forces and moments";
-/// Reason for refusing an effect whose contribution another effect accounts for.
+/// Reason to refuse an effect if another effect explains the same residual.
 const MAY_BE_ZERO: &str = "its 95 % interval holds zero once all effects have settled";
 
 /// Determines which effects of the catalogue `model` lacks according to `flights`.
 ///
-/// The flights must have been reconstructed with their deflections as recorded. Progress goes to `progress`, which may
-/// cancel.
+/// The flights must have been reconstructed with their deflections as recorded. `progress` is called at each stage and
+/// may cancel.
 ///
 /// # Errors
 /// There is too little flight or excitation, the id of an effect is unknown, the sampling interval of a flight is not
@@ -80,7 +80,7 @@ pub fn diagnose(
     Ok(diagnosis)
 }
 
-/// Diagnosis without the constants of single flights in the model file.
+/// Diagnosis that does not use the constants of single flights in the model file.
 fn of_unknown(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -151,10 +151,11 @@ fn loads(model: &GreyBox, flights: &[Prepared]) -> Vec<Vec<Series>> {
     flights.iter().map(of).collect()
 }
 
-/// A note on the windows of `series` in which `model` predicts no number; `None` if there are none.
+/// Returns a note on the windows of `series` in which `model` predicts no finite number; `None` if there are none.
 ///
 /// # Errors
-/// The model predicts no number in any window of a measured channel, which would then count as explained.
+/// The model predicts no finite number in any window of a measured channel. Such a channel would otherwise count as
+/// explained.
 fn predicted(model: &GreyBox, series: &[Vec<Series>]) -> Result<Option<String>, DiagnoseError> {
     let lost = |channel: &ChannelId| {
         let own = series.iter().flatten().filter(|s| s.channel == *channel);
@@ -178,7 +179,7 @@ fn settings(options: &Options) -> Settings {
     }
 }
 
-/// Objections to effects beyond the search's own checks, and the tuned coefficients.
+/// Results of the checks that follow the search.
 struct Judged {
     abstained: [Option<String>; 6],
     /// Whether `compare` finds no certain error of the given model in any channel.
@@ -187,8 +188,8 @@ struct Judged {
     doubtful: Vec<String>,
 }
 
-/// Refuses effects in channels in which the flights cannot assess the model, and effects whose amount may be zero.
-/// Refuses all effects if an estimate is physically impossible.
+/// Refuses effects in channels in which the flights cannot assess the model, and effects whose coefficients may be
+/// zero. Refuses all effects if an estimate is physically impossible.
 fn judge(
     found: &mut Found,
     model: &GreyBox,
@@ -207,12 +208,12 @@ fn judge(
     Judged { abstained, faultless, tuned, doubtful }
 }
 
-/// The verdict and, if it is [`Verdict::Unknown`] for lack of evidence, the reason.
+/// Returns the verdict. If it is [`Verdict::Unknown`] although no estimate is impossible, also returns the reason.
 ///
-/// Impossible figures override any verdict. Three further conditions turn only `Unexplained` into `Unknown`: no
-/// channel can be judged, the given model has no certain error, or a flexible model of the states removes little of the
-/// residual. In the last case the residual is not a function of the states; timing errors or filtered sensors leave such
-/// residuals.
+/// An impossible estimate overrides any verdict. Three further conditions turn only `Unexplained` into `Unknown`: no
+/// channel can be assessed, the given model has no certain error, or a flexible model of the states removes little of
+/// the residual. In the last case the residual is not a function of the states. Timing errors or filtered sensors leave
+/// such residuals.
 fn spoken(
     found: &Found,
     doubtful: &[String],
@@ -233,7 +234,8 @@ fn spoken(
     }
 }
 
-/// Results of `compare`: the reason why each channel cannot be assessed, and whether no channel has a certain error.
+/// Returns the results of `compare`: for each channel, the reason why it cannot be assessed; and whether no channel has
+/// a certain error.
 fn compared(
     model: &GreyBox,
     flights: &[&Reconstruction],
@@ -248,7 +250,7 @@ fn compared(
     (abstained, !all.is_empty() && all.iter().all(|a| !a.sure_error))
 }
 
-/// Checks that every id is one of the catalogue.
+/// Checks that every id belongs to an effect of the catalogue or of a loaded effect file.
 pub fn known(ids: &[String]) -> Result<(), DiagnoseError> {
     match ids.iter().find(|id| physics::catalogue::describe(id).is_none()) {
         None => Ok(()),
@@ -256,10 +258,11 @@ pub fn known(ids: &[String]) -> Result<(), DiagnoseError> {
     }
 }
 
-/// The problem, the flights it is made from, and notes for the reader.
+/// The problem, the flights that it contains, and notes for the reader.
 pub type Intake<'a> = (Problem, Vec<&'a Reconstruction>, Vec<String>);
 
-/// Resamples the flights to the model's clock; flights that cannot be used are noted.
+/// Resamples the flights to a multiple of the model step and sets up the problem with its priors. Flights that cannot
+/// be used are left out with a note.
 pub fn problem<'a>(
     model: &GreyBox,
     flights: &'a [Reconstruction],
@@ -294,7 +297,7 @@ pub fn problem<'a>(
     Ok((problem, used, notes))
 }
 
-/// The verdict on the search's result: an effect, something unexplained, or an adequate model.
+/// Returns the verdict on the search's result: an effect, something unexplained, or an adequate model.
 pub fn verdict(found: &Found) -> Verdict {
     let significant =
         found.remainder.total > found.remainder.total_threshold && found.learnable() > WORTH_SAYING;

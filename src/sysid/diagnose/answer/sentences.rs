@@ -10,18 +10,19 @@ use crate::per_flight::askew;
 use greylag_model::GreyBox;
 use greylag_physics::catalogue::describe;
 
-/// Distance from the prior mean, in prior standard deviations, beyond which a tuned coefficient gets a note.
+/// Distance from the prior mean, in prior standard deviations, beyond which a re-estimated coefficient gets a note.
 const FAR: f64 = 3.0;
 /// Smallest share that is reported. A smaller share would be printed as zero.
 const SHOWN: f64 = 0.005;
 /// Half width of a 95 % interval in standard deviations.
 pub const INTERVAL: f64 = 1.96;
-/// Share of the error on held-out segments from which a refused effect is named as the closest shape.
+/// A refused effect is named as the closest one if it removes more than this share of the residual from held-out
+/// blocks.
 const CLOSEST: f64 = 0.5;
 /// Advice for misaligned axes.
 const AXES: &str = "amend with --axes-askew 3, or mount the board anew";
 
-/// Input of the sentences.
+/// Results that the sentences describe.
 pub struct Content<'a> {
     /// Result of the search.
     pub found: &'a Found,
@@ -29,9 +30,9 @@ pub struct Content<'a> {
     pub verdict: Verdict,
     /// Reason for [`Verdict::Unknown`]; `None` for other verdicts, and if an impossible estimate is the reason.
     pub why_unknown: Option<WhyUnknown>,
-    /// Physically impossible figures, in words.
+    /// Physically impossible estimates, in words.
     pub doubtful: &'a [String],
-    /// All candidates, in the order of the list.
+    /// All candidates, the asserted effects first.
     pub effects: &'a [Candidate],
     /// Unexplained residual of each channel.
     pub channels: &'a [ChannelLeft],
@@ -46,14 +47,14 @@ pub struct Content<'a> {
 pub enum WhyUnknown {
     /// The remaining errors of the sensors may account for the residual in every channel.
     SensorsMayAccount,
-    /// The model as given has no sure error in any channel.
+    /// The model as given has no certain error in any channel.
     GivenModelFaultless,
-    /// A flexible model of the states removes little of the residual.
+    /// A flexible model of the states can remove only little of the residual.
     NotOfTheStates,
 }
 
-/// The sentences, the most important first: impossible estimates, misaligned axes, missing effects with the verdict,
-/// then the remaining residual and the sensors.
+/// Describes the results in sentences, the most important first: impossible estimates, misaligned axes, missing effects
+/// with the verdict, remaining residual, sensors.
 pub fn sentences(content: &Content) -> Vec<String> {
     let Content { verdict, doubtful, effects, channels, measurement, .. } = *content;
     let mut all: Vec<String> = doubtful.to_vec();
@@ -90,7 +91,7 @@ pub fn sentences(content: &Content) -> Vec<String> {
     all
 }
 
-/// The sentence of the verdict; none if effects are asserted, since their own sentences follow.
+/// Sentence that states the verdict. `None` if effects are asserted, because each of them has its own sentence.
 fn answer(content: &Content) -> Option<String> {
     let Content { found, verdict, doubtful, effects, .. } = *content;
     match verdict {
@@ -108,7 +109,7 @@ fn answer(content: &Content) -> Option<String> {
     }
 }
 
-/// Reason why no effect is asserted although the residual exceeds noise.
+/// Sentence that states why no effect is asserted although the residual exceeds noise.
 fn undecided(content: &Content) -> String {
     match content.why_unknown {
         Some(WhyUnknown::GivenModelFaultless) => "The model as given has no sure error in any channel of these flights, \
@@ -127,7 +128,8 @@ fn undecided(content: &Content) -> String {
     }
 }
 
-/// Sentence that an effect is missing, with the closest effect of the catalogue if one explains most of the error.
+/// Sentence that states that an effect is missing. It names the closest effect of the catalogue if this effect removes
+/// most of the residual.
 fn unexplained(found: &Found, effects: &[Candidate]) -> String {
     let close = |c: &&Candidate| c.status == Status::Refused && c.heldout_error_reduction > CLOSEST;
     match effects.iter().find(close) {
@@ -148,7 +150,7 @@ fn unexplained(found: &Found, effects: &[Candidate]) -> String {
     }
 }
 
-/// Sentences on the residual beyond the effects found.
+/// Sentences on the residual that remains with the effects found.
 fn beyond(content: &Content) -> Vec<String> {
     let Content { found, verdict, channels, .. } = *content;
     let left = channels.iter().filter(|c| !c.abstained).filter_map(|c| {
@@ -167,7 +169,7 @@ fn beyond(content: &Content) -> Vec<String> {
     all
 }
 
-/// The channels in which these flights cannot judge the model, by reason.
+/// Sentences on the channels in which these flights cannot assess the model, one for each reason.
 fn abstained(channels: &[ChannelLeft]) -> Vec<String> {
     let mut by_reason: Vec<(&str, Vec<&str>)> = Vec::new();
     for c in channels {
@@ -182,7 +184,7 @@ fn abstained(channels: &[ChannelLeft]) -> Vec<String> {
     by_reason.into_iter().map(one).collect()
 }
 
-/// Significant sensor errors, a sentence for each flight.
+/// Sentences on significant sensor errors and wind, one for each flight.
 fn sensors(measurement: &[Measurement]) -> Vec<String> {
     let before = measurement.iter().filter(|m| m.asserted && m.id != askew::ID);
     let mut flights: Vec<(&str, Vec<String>)> = Vec::new();
@@ -255,8 +257,8 @@ fn asserted(c: &Candidate) -> String {
     text
 }
 
-/// Sentence on the effects `others` that may be the cause as well, with the manoeuvres `separate` that would decide. An
-/// effect file need not state such manoeuvres. No manoeuvre decides between an effect and misaligned axes.
+/// Sentence that names `others`, effects that may also be the cause, and the manoeuvres `separate` that would decide.
+/// An effect file may state no manoeuvres. No manoeuvre decides between an effect and misaligned axes.
 fn alike(others: &[String], separate: &str) -> String {
     let decides = match separate {
         _ if others.iter().all(|id| id == askew::ID) => format!("; to see, {AXES}"),
@@ -269,7 +271,7 @@ fn alike(others: &[String], separate: &str) -> String {
     )
 }
 
-/// Phrase for the error that a flexible model could remove; empty if it does not exceed chance.
+/// Phrase that states how much of the residual a flexible model could remove; empty if this does not exceed chance.
 fn removable(found: &Found) -> String {
     let more = found.remainder.total > found.remainder.total_threshold;
     match more && found.learnable() >= SHOWN {
@@ -300,7 +302,8 @@ pub fn figures(x: f64) -> String {
     format!("{x:.places$}")
 }
 
-/// Notes on coefficients far from their prior, and on effects that were not searched.
+/// Notes on coefficients and sensor errors far from their prior, on the flexible model, and on effects that were not
+/// candidates.
 pub fn notes(found: &Found, model: &GreyBox, options: &Options) -> Vec<String> {
     let mut notes = Vec::new();
     for t in shares::tuned(found, model) {

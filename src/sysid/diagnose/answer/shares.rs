@@ -1,4 +1,4 @@
-//! Unexplained residual of each channel after tuning, and the tuned coefficients.
+//! Unexplained residual of each channel, and the re-estimated coefficients.
 
 use crate::compare::{ChannelId, RegimeVariable};
 use crate::diagnose::answer::result::{ChannelLeft, Tuned};
@@ -10,11 +10,12 @@ use greylag_num::statistics::mean;
 
 /// Number of bins over a regime variable.
 const BINS: usize = 5;
-/// A bin is reported if its mean exceeds this number of standard errors.
+/// A bin is reported if its mean residual exceeds this number of standard errors.
 const WORTH: f64 = 4.0;
 const SYMBOLS: [&str; 6] = ["D", "L", "Y", "l", "m", "n"];
 
-/// Unexplained residual of every channel that the flights measure.
+/// Unexplained residual of every channel that the flights measure. `abstained` holds the reason for each channel in
+/// which the flights cannot assess the model.
 pub fn channels(found: &Found, abstained: &[Option<String>; 6]) -> Vec<ChannelLeft> {
     let (before, after) = (found.unexplained, found.left());
     let residual = found.round().tuned_residual();
@@ -30,7 +31,8 @@ pub fn channels(found: &Found, abstained: &[Option<String>; 6]) -> Vec<ChannelLe
     (0..SYMBOLS.len()).filter(|k| before[*k].is_finite()).map(of).collect()
 }
 
-/// The regime in which a channel's mean residual is most significant, in words; `None` if none is significant.
+/// The flight condition (regime) in which a channel's mean residual is most significant, in words; `None` if no mean
+/// residual is significant.
 fn worst(round: &Round, residual: &[Column], channel: usize) -> Option<String> {
     let mut points = Vec::new();
     for (flight, left) in round.flights.iter().zip(residual) {
@@ -60,7 +62,7 @@ fn worst_of(mut points: Vec<Point>, channel: usize) -> Option<String> {
             let sd = (values.iter().map(|x| (x - m).powi(2)).sum::<f64>()
                 / (values.len().max(2) - 1) as f64)
                 .sqrt();
-            // neighbouring windows overlap by half
+            // neighbouring windows overlap by half, so only half of them are independent
             let z = m.abs() / (sd / (0.5 * values.len() as f64).sqrt());
             if z > WORTH && best.as_ref().is_none_or(|(other, _)| z > *other) {
                 let id = ChannelId::ALL[channel];
@@ -81,7 +83,7 @@ fn worst_of(mut points: Vec<Point>, channel: usize) -> Option<String> {
     best.map(|(_, words)| words)
 }
 
-/// The coefficients of `model` as tuned in the last round.
+/// The coefficients of `model` as re-estimated in the last round.
 pub fn tuned(found: &Found, model: &GreyBox) -> Vec<Tuned> {
     let round = found.round();
     let p = &round.projected;
@@ -104,7 +106,7 @@ mod tests {
 
     #[test]
     fn a_single_window_is_no_regime() {
-        // 21 windows: the last of five bins has a single one
+        // 21 windows: the last of five bins contains a single window
         let point = |k: usize| {
             let mut regime = [0.0; RegimeVariable::CONTINUOUS.len()];
             regime[0] = k as f64;

@@ -1,4 +1,4 @@
-//! Free forms: a search over the formulas of a grammar if the shapes of the library leave a residual.
+//! Free forms: a search over the expressions of a grammar if the shapes of the library leave a residual.
 
 use super::forward::{Ask, Climbed, ORDER, candidates};
 use super::free::search::{Fitted, Searched, searched};
@@ -12,20 +12,21 @@ use crate::progress::{Progress, part, report};
 use greylag_model::GreyBox;
 use greylag_physics::Channel;
 
-/// Free forms are tried if a flexible model could remove an additional error of more than this share of the error that the
-/// library's formula removes.
+/// Free forms are tried if a flexible model could still remove more than this share of the residual that the library's
+/// formula removes.
 const MATERIAL: f64 = 0.02;
-/// The simplest form is chosen whose error reduction is within this share of the best reduction. Even an exact formula of a
-/// strong effect leaves a residual of this order, due to errors of the reconstructed path.
+/// The chosen form is the simplest one whose reduction of the residual is at most this share below the largest
+/// reduction. Even an exact formula of a strong effect leaves a residual of this order, due to errors of the
+/// reconstructed path.
 const BEHIND: f64 = 0.01;
-/// Smallest additional reduction of the squared whitened error that justifies a larger formula.
+/// Smallest additional reduction of the whitened residual sum of squares that justifies a larger formula.
 const WORTH: f64 = 10.0;
 
-/// Reason why free forms are tried, and the channels.
+/// Returns the reason to try free forms, and the channels in which they are tried.
 ///
-/// `None` if the library's formula suffices: a flexible model hardly removes more, one shape is enough for the channel, and
-/// no significant second shape was left out. `None` also if the model cannot be evaluated over the flights, or if no channel
-/// is included.
+/// `None` if the library's formula suffices: a flexible model hardly removes more, one shape is enough for the channel,
+/// and no significant second shape was left out. `None` also if the model cannot be evaluated over the flights, or if
+/// no channel is included.
 pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel>)> {
     let counted = |c: &usize| ask.channels[*c];
     if library.terms.is_empty() {
@@ -60,9 +61,11 @@ pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel
     Some((why.into(), vec![library.terms[0].form.channel]))
 }
 
-/// Searches free forms for `channels` in the residual of the library's first round, then selects among these forms and the
-/// library's best forms, starting from `tuned`.
-/// `None` if the library's search tried nothing, or if the model cannot be evaluated over the flights.
+/// Searches free forms for `channels` in the residual of the library's first round. Then selects among these forms and
+/// the library's best forms, starting from `tuned`. `why` is the reason for the search.
+///
+/// Returns a record of the free forms, and the new selection. `None` if the library's search tried nothing, or if the
+/// model cannot be evaluated over the flights.
 ///
 /// # Errors
 /// `progress` cancelled.
@@ -99,7 +102,7 @@ pub(super) fn beyond(
         ..*ask
     };
     let Some(climbed) = ask.climb(tuned.clone()) else { return Ok(None) };
-    // with a form, coefficients no longer compensate for its absence: the form's reduction includes this part
+    // the reduction by a form may exceed the residual: other coefficients no longer compensate for its absence
     let falls = all.iter().flat_map(|(_, s)| s.front.iter().map(|f| f.fall));
     let whole = falls.fold(library.excess, f64::max);
     let rung = |f: &Fitted, threshold: f64| Rung {
@@ -117,7 +120,7 @@ pub(super) fn beyond(
     Ok(Some((FreeForms { why, tried, front, chosen }, climbed)))
 }
 
-/// The library's form with the same text as `form`, or `form` itself.
+/// Returns the library's form with the same text as `form`. If there is none, returns `form` itself.
 fn as_of_library(form: Form) -> Form {
     let text = form.shape.text(None);
     let of = library::forms(form.channel, &|_, _| 0.0);
@@ -127,11 +130,11 @@ fn as_of_library(form: Form) -> Form {
 
 /// Whether the formula `free` replaces the formula of the library.
 ///
-/// - With the same structure and other constants, `free` must reduce the error by more than `WORTH` beyond the library's
-///   formula. The library takes its constants from quantiles of the flights and does not fit them.
-/// - A simpler formula may reduce the error less. The largest difference is `WORTH` or the share `BEHIND` of the library's
-///   reduction, whichever is larger.
-/// - Any other formula must reduce the error more by at least this difference.
+/// - If both have the same structure and other constants, `free` must reduce the residual sum of squares further by
+///   more than `WORTH`. The library takes its constants from quantiles of the flights and does not fit them.
+/// - A simpler formula may reduce it less. The difference must be smaller than `WORTH` or the share `BEHIND` of the
+///   library's reduction, whichever is larger.
+/// - Any other formula must reduce it more, by at least the same difference.
 pub(super) fn better(free: &Climbed, library: &Climbed) -> bool {
     let taken = |c: &Climbed| c.removed() * library.excess;
     let more = taken(free) - taken(library);
@@ -145,7 +148,7 @@ pub(super) fn better(free: &Climbed, library: &Climbed) -> bool {
     }
 }
 
-/// The shapes without their constants.
+/// Structure of a formula: channel, scaling and shape of each term, without the constants.
 fn structure(of: &Climbed) -> Vec<(Channel, bool, String)> {
     let letters = |form: &Form| -> String {
         form.shape.text(None).chars().filter(|c| !c.is_ascii_digit() && *c != '.').collect()

@@ -15,8 +15,8 @@ pub struct Term {
     pub sd: f64,
 }
 
-/// Whether a further term was `added` to `terms`. If it was not, or if the model with it cannot be evaluated (`None`),
-/// the terms are cut to their former `count`.
+/// Drops the last term of `terms` unless it was `added`: the list is cut to its former length `count`. `added` is
+/// `None` if the model with the term cannot be evaluated. Returns whether the term was added.
 pub fn kept(terms: &mut Vec<Term>, count: usize, added: Option<bool>) -> bool {
     let added = added == Some(true);
     if !added {
@@ -25,15 +25,16 @@ pub fn kept(terms: &mut Vec<Term>, count: usize, added: Option<bool>) -> bool {
     added
 }
 
-/// Factor in the bounds of a coefficient: ± this factor times the sum of its magnitude and three standard deviations.
+/// A coefficient's bounds in the effect file are ± this factor times the sum of its magnitude and three standard
+/// deviations.
 const ROOM: f64 = 10.0;
 
-/// `x` to four significant figures.
+/// Rounds `x` to four significant figures.
 fn rounded(x: f64) -> f64 {
     format!("{x:.3e}").parse().unwrap_or(x)
 }
 
-/// Identifier of the proposed effect.
+/// Identifier of the proposed effect, at most 40 characters: channel and variables of its terms.
 pub fn id(terms: &[Term]) -> String {
     let channel = terms.first().map_or("", |t| channel_name(t.form.channel));
     let mut names: Vec<&str> = Vec::new();
@@ -55,14 +56,15 @@ pub fn formula(terms: &[Term]) -> String {
     terms.iter().map(one).collect::<Vec<_>>().join("; ")
 }
 
-/// Names of the constants of the term with index `k`.
+/// Names that the constants of the term with the index `k` have in the effect file.
 fn names(k: usize, term: &Term) -> Vec<String> {
     let count = term.form.shape.constants().len();
     let letter = |i: usize| if count > 1 { ["a", "b", "c", "d"][i.min(3)] } else { "" };
     (0..count).map(|i| format!("w{}{}", k + 1, letter(i))).collect()
 }
 
-/// The effect file of `terms` with free thresholds; `from` names the flights of the search.
+/// Text of the effect file for `terms`, in which thresholds and other constants are parameters. `alike` lists formulas
+/// that the flights cannot distinguish from the proposed one. `from` names the flights of the search.
 pub fn file(terms: &[Term], description: &str, alike: &[String], from: &str) -> String {
     let quoted = |text: &str| toml::Value::from(text).to_string();
     let mut text = format!(

@@ -1,4 +1,4 @@
-//! Forward selection of terms: adds the best form as long as it is significant and reduces the error enough.
+//! Forward selection of terms: adds the best form as long as it is significant and reduces the residual enough.
 
 use super::draft::{self, Term};
 use super::grades;
@@ -19,15 +19,15 @@ use greylag_physics::formula::Variable;
 
 /// Largest number of terms of a formula.
 const MOST: usize = 3;
-/// A further term must remove at least this share of the error that the first term removes.
+/// A further term must reduce the residual by at least this share of the first term's reduction.
 const WORTH: f64 = 0.05;
-/// Number of tuning passes after a term has been added.
+/// Number of passes in which all coefficients are re-estimated after a term has been added.
 const SETTLING: usize = 2;
-/// Unexplained share of the variance beyond noise from which a channel is searched; the diagnosis's adequate level.
+/// A channel is searched if at least this share of its variance beyond noise is unexplained.
 const FAILING: f64 = 5e-4;
-/// Unexplained share, relative to the worst channel, from which a channel is searched.
+/// The unexplained share must also be at least this fraction of the worst channel's share.
 const BESIDE: f64 = 0.05;
-/// Number of standard deviations by which joint tuning may change a coefficient. A larger change shows confounded terms.
+/// A change of a coefficient by more than this number of standard deviations shows that terms are confounded.
 const MOVED: f64 = 5.0;
 /// Largest number of channels that are searched.
 const CHANNELS: usize = 3;
@@ -35,7 +35,7 @@ const CHANNELS: usize = 3;
 pub(super) const ORDER: [Channel; 6] =
     [Channel::Drag, Channel::Lift, Channel::Side, Channel::Roll, Channel::Pitch, Channel::Yaw];
 
-/// The channels that the diagnosis leaves unexplained, in descending order of removable error relative to its chance level.
+/// The channels that the diagnosis leaves unexplained, by descending ratio of removable residual to critical value.
 pub(super) fn failing(found: &Found) -> Vec<Channel> {
     let tuned = &found.unexplained;
     let removable = |c: usize| {
@@ -50,13 +50,13 @@ pub(super) fn failing(found: &Found) -> Vec<Channel> {
     all.into_iter().map(|c| ORDER[c]).collect()
 }
 
-/// The forms of the library in `channels`, with their entries for the regression.
+/// The forms of the library in `channels`, with their entries as candidates of the regression.
 pub(super) fn forms(problem: &Problem, channels: &[Channel]) -> Vec<(Form, Entry)> {
     let threshold = |v: Variable, q: f64| rounded(magnitude(problem, v, q));
     candidates(channels.iter().flat_map(|c| library::forms(*c, &threshold)))
 }
 
-/// `forms` with their entries for the regression.
+/// Adds the entries for the regression to `forms`. Invalid forms are left out.
 pub(super) fn candidates(forms: impl Iterator<Item = Form>) -> Vec<(Form, Entry)> {
     let entry = |form: Form| {
         let effect = form.effect().ok()?;
@@ -65,7 +65,7 @@ pub(super) fn candidates(forms: impl Iterator<Item = Form>) -> Vec<(Form, Entry)
     forms.filter_map(entry).collect()
 }
 
-/// `x` to two significant figures, for readable thresholds.
+/// Rounds `x` to two significant figures, for readable thresholds.
 fn rounded(x: f64) -> f64 {
     format!("{x:.1e}").parse().unwrap_or(x)
 }
@@ -95,15 +95,15 @@ pub(super) struct Ask<'a> {
     pub problem: &'a Problem,
     pub options: &'a Options,
     pub forms: &'a [(Form, Entry)],
-    /// Channels whose error is included, in the order of the regression.
+    /// Channels whose residual is included, in the order of the regression.
     pub channels: [bool; 6],
-    /// Smallest evidence of the first term, independent of the chance level among `forms`, for preselected forms.
+    /// Smallest evidence of the first term: the critical value of the search that selected the forms, else 0.
     pub least: f64,
-    /// A simpler form may remove less error than the best form, by this share of the error that the best form removes.
+    /// Largest loss of error reduction, as a share, for which a simpler form is preferred to the best form.
     pub behind: f64,
 }
 
-/// Record of a search: formulas, alternatives, grades, objections, and the best evidence in null flights.
+/// Record of a search: formulas, alternatives, certain properties, objections, evidence in bootstrap draws.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Outcome {
     pub front: Vec<Rung>,
@@ -116,26 +116,26 @@ pub(super) struct Outcome {
 /// State and result of a forward search.
 pub(super) struct Climbed {
     pub outcome: Outcome,
-    /// The first term as it was found; `None` if there is none.
+    /// The first term before the joint re-estimation; `None` if no term was found.
     pub first: Option<Term>,
-    /// All terms with their tuned coefficients.
+    /// All terms, with their coefficients from the joint re-estimation.
     pub terms: Vec<Term>,
     /// Forms that the flights cannot distinguish from the first term.
     pub class: Vec<Form>,
     /// The model with the terms added.
     pub model: GreyBox,
-    /// Squared error beyond noise of the model as given.
+    /// Residual beyond noise of the model as given: whitened residual sum of squares minus that of pure noise.
     pub excess: f64,
     /// The first round; `None` if there was nothing to try.
     pub round: Option<Round>,
-    /// Whether a further term was significant and removed enough of the error but was not added. The present terms then
-    /// compensate for another form.
+    /// Whether a further term was significant and removed enough of the residual but could not be added. The present
+    /// terms then approximate another form.
     pub significant_left_out: bool,
     first_fall: f64,
 }
 
 impl Climbed {
-    /// Share of the squared error beyond noise that the terms remove.
+    /// Share of the residual beyond noise that the terms remove.
     pub(super) fn removed(&self) -> f64 {
         self.outcome.front.iter().find(|r| r.chosen).map_or(0.0, |r| r.removed)
     }
@@ -146,7 +146,7 @@ impl Climbed {
     }
 }
 
-/// A round with its best form.
+/// A round, with the index of its best form in `scores`.
 struct Stage<'a> {
     round: &'a Round,
     scores: &'a [(usize, Score)],
@@ -155,8 +155,8 @@ struct Stage<'a> {
 }
 
 impl Ask<'_> {
-    /// Adds terms to `model` one by one as long as each is significant and removes enough of the error. `None` if the model
-    /// cannot be evaluated over the flights.
+    /// Adds terms to `model` one by one as long as each is significant and removes enough of the residual. `None` if
+    /// the model cannot be evaluated over the flights.
     pub(super) fn climb(&self, model: GreyBox) -> Option<Climbed> {
         let given = model.clone();
         let excess = self.excess(&model)?.max(1.0);
@@ -202,8 +202,8 @@ impl Ask<'_> {
         Some(c)
     }
 
-    /// Records the best form of a round in the front, and adds an accepted form to the terms and the model. Returns whether it
-    /// was added. `None` if the model with the form cannot be evaluated over the flights.
+    /// Records the best form of a round and, if accepted, adds it to the terms and the model. Returns whether it was
+    /// added. `None` if the model with the form cannot be evaluated over the flights.
     fn joins(&self, c: &mut Climbed, given: &GreyBox, stage: &Stage) -> Option<bool> {
         let &Stage { round, scores, place, threshold } = stage;
         let (trial, score) = &scores[place];
@@ -216,7 +216,7 @@ impl Ask<'_> {
         c.outcome.front.push(Rung {
             formula: draft::formula(&c.terms),
             complexity: c.complexity(),
-            // with a term, coefficients no longer compensate for its absence: the term's reduction includes this part
+            // the reduction by a term may exceed the residual: other coefficients no longer compensate for its absence
             removed: (before + score.fall / c.excess).min(1.0),
             evidence: score.evidence,
             threshold,
@@ -238,7 +238,7 @@ impl Ask<'_> {
             return Some(false);
         };
         let removed = held_out::removed(self.problem, given, &tuned, &self.channels)?;
-        // a term that changes other coefficients strongly, or does not reduce the error, duplicates another term
+        // a term that changes other terms strongly, or does not reduce the residual, duplicates another term
         if c.terms.iter().any(|t| moved(t, &tuned)) || removed <= before {
             c.terms.pop();
             return Some(false);
@@ -269,12 +269,12 @@ impl Ask<'_> {
         c.outcome.alike = alike.iter().map(alternative).collect();
     }
 
-    /// Squared error beyond noise of `model`.
+    /// Residual beyond noise of `model`; `None` if the model cannot be evaluated.
     fn excess(&self, model: &GreyBox) -> Option<f64> {
         Some(checks::excess(&Round::new(self.problem, model.clone(), &[])?, &self.channels))
     }
 
-    /// The model of `round` with a trial added and all coefficients tuned. `Some(None)` if the trial cannot join the model.
+    /// The model of `round` with a candidate added, re-estimated. `Some(None)` if the candidate cannot be added.
     fn tuned(&self, round: &Round, trial: usize, score: &Score) -> Option<Option<GreyBox>> {
         let mut model = round.with(score);
         if model.join_most(round.trials[trial].id, &score.values).is_err() {
@@ -298,7 +298,7 @@ impl Ask<'_> {
         }
     }
 
-    /// Index of the simplest form among the forms that are as good as the best form.
+    /// Index in `scores` of the simplest form that is as good as the best form.
     fn winner(&self, round: &Round, scores: &[(usize, Score)]) -> Option<usize> {
         let fits = |k: &usize| {
             let (trial, score) = &scores[*k];
@@ -314,7 +314,7 @@ impl Ask<'_> {
                 .collect(),
             false => checks::class(round, scores, best),
         };
-        // a simpler form must be about as likely, or remove almost as much error
+        // a simpler form must be about as likely, or remove almost as much of the residual
         let likely = |k: &usize| {
             let slack =
                 (LIKELY + NODE * (size(best) as f64 - size(*k) as f64)).max(self.behind * own.fall);
@@ -325,8 +325,8 @@ impl Ask<'_> {
         simpler.min_by_key(|k| (size(*k), *k)).or(Some(best))
     }
 
-    /// Forms that these flights cannot distinguish from the form at index `place`, with their evidence. Among preselected forms,
-    /// larger forms are excluded, because there is always a larger form that fits as well.
+    /// Forms that the flights cannot distinguish from the form at index `place`, with their evidence. If an earlier
+    /// search selected the forms, larger ones are left out, because some larger form always fits as well.
     fn alike(&self, round: &Round, scores: &[(usize, Score)], place: usize) -> Vec<(Form, f64)> {
         let own = self.form(round.trials[scores[place].0].id).map_or(0, |f| f.shape.complexity());
         checks::class(round, scores, place)
@@ -341,7 +341,7 @@ impl Ask<'_> {
             .collect()
     }
 
-    /// Whether a similar form removes significantly more error for its size. The chosen form is then an approximation.
+    /// Whether a larger, correlated form removes much more of the residual; the chosen form is then an approximation.
     fn surpassed(&self, stage: &Stage) -> bool {
         let &Stage { round, scores, place, .. } = stage;
         let size = |k: usize| {
@@ -362,7 +362,7 @@ impl Ask<'_> {
         self.forms.iter().find(|(_, e)| e.about.id == id).map(|(form, _)| *form)
     }
 
-    /// The terms with their coefficients as jointly tuned in `model`.
+    /// The terms with their coefficients in `model`, in which they were estimated jointly.
     fn joint(&self, model: &GreyBox, mut terms: Vec<Term>) -> Vec<Term> {
         for term in &mut terms {
             let prefix = format!("{}.", term.form.id());
@@ -375,14 +375,14 @@ impl Ask<'_> {
     }
 }
 
-/// Objection to a form whose coefficient differs between flights, with the criterion for effects of the catalogue.
+/// Objection to a form whose coefficient differs between flights; `None` if the flights agree.
 fn contradicted(round: &Round, trial: usize, score: &Score) -> Option<String> {
     let by_flight = checks::by_flight(round, &round.trials[trial], score);
     checks::contradict(score.values[0], &by_flight[0].1)
         .then(|| "the flights contradict one another about its amount".into())
 }
 
-/// Whether tuning changed the coefficient of `term` in `model` by more than its uncertainty allows.
+/// Whether the joint re-estimation changed the coefficient of `term` by more than its uncertainty allows.
 fn moved(term: &Term, model: &GreyBox) -> bool {
     let name = format!("{}.k", term.form.id());
     let now = model.coefficients().iter().find(|c| c.name == name);
@@ -392,9 +392,9 @@ fn moved(term: &Term, model: &GreyBox) -> bool {
     })
 }
 
-/// A simpler form may remove less of the squared whitened error by this amount; its likelihood ratio is then e⁻².
+/// The reduction of the residual sum of squares by a simpler form may be this much lower: a likelihood ratio of e⁻².
 const LIKELY: f64 = 4.0;
-/// Additional allowance for each node that the simpler form has less. With each node there are about e times as many forms.
+/// Additional allowance for each node by which the form is smaller. Each node allows about e times as many forms.
 const NODE: f64 = 2.0;
 /// Two contributions are the same form, written in different ways, if their correlation differs from ±1 by less than this.
 const SAME: f64 = 1e-9;

@@ -6,7 +6,7 @@ use super::result::Grades;
 use greylag_physics::Channel;
 use greylag_physics::formula::Variable;
 
-/// Trend of a form with each of its variables.
+/// Trend of a form in each of its variables (parity and monotonicity), in words.
 fn trend(form: &Form) -> Option<String> {
     // in the steady state, a lagged control equals the control
     let shape = match form.shape {
@@ -16,7 +16,8 @@ fn trend(form: &Form) -> Option<String> {
     free::trend::trend(&shape.text(None))
 }
 
-/// The properties that `best` and all forms `alike` have in common. The flights cannot distinguish `alike` from `best`.
+/// Determines which properties of `best` are certain: those that all forms of `alike` share. The flights cannot
+/// distinguish these forms from `best`.
 pub fn grades(best: &Form, alike: &[Form]) -> Grades {
     let same = |of: &dyn Fn(&Form) -> bool| alike.iter().all(of);
     let variables = sorted(best);
@@ -28,7 +29,7 @@ pub fn grades(best: &Form, alike: &[Form]) -> Grades {
     }
 }
 
-/// The variables of the shape, sorted by name.
+/// Names of the form's variables, sorted. A body rate and the same rate divided by the airspeed have one name.
 fn sorted(form: &Form) -> Vec<&'static str> {
     let mut all: Vec<&str> = form.shape.variables().into_iter().map(plain).collect();
     all.sort_unstable();
@@ -59,7 +60,8 @@ fn long(v: Variable) -> &'static str {
     }
 }
 
-/// Dependence of the form's channel on its variables, in words, for the coefficient `value`.
+/// Describes in words how the form's channel depends on its variables. `value` is the coefficient, whose sign decides
+/// between growth and decrease.
 pub fn words(form: &Form, value: f64) -> String {
     let runs = if value < 0.0 { "falls" } else { "grows" };
     let how = match form.shape {

@@ -1,4 +1,4 @@
-//! Test of a formula on held-out flights: removed share of the error, compared with chance.
+//! Test of a formula on held-out flights: share of the residual that it removes, compared with chance.
 
 use super::draft::Term;
 use super::forward::ORDER;
@@ -13,10 +13,10 @@ use crate::diagnose::search::stepwise::HELD_OUT;
 use greylag_model::GreyBox;
 use greylag_physics::formula::Written;
 
-/// Share of the error beyond noise of the model `before`, in `channels`, that the model `after` removes. `None` if a model
-/// cannot be evaluated over the flights.
+/// Share of the residual beyond noise of the model `before`, in `channels`, that the model `after` removes. `None` if a
+/// model cannot be evaluated over the flights.
 ///
-/// Both errors use the noise level of `after`. A better model would otherwise be penalised for its smaller noise.
+/// Both residuals use the noise of `after`. Otherwise a better model would be penalised for its smaller noise.
 pub(super) fn removed(
     problem: &Problem,
     before: &GreyBox,
@@ -30,8 +30,8 @@ pub(super) fn removed(
     Some(1.0 - left / all.max(1.0))
 }
 
-/// Reduction of the residual of `model` on held-out flights by `terms` with fixed coefficients. `None` if the model cannot be
-/// evaluated over the flights.
+/// Tests how far `terms` with fixed coefficients reduce the residual of `model` on held-out flights. `flights` holds
+/// their names. `None` if the model cannot be evaluated over the flights.
 pub(super) fn tested(
     problem: &Problem,
     model: &GreyBox,

@@ -9,8 +9,8 @@ use greylag_model::GreyBox;
 use greylag_physics::Channel;
 use greylag_physics::formula::Variable;
 
-/// The lagged forms to try: lags of the controls in the library's formula, and of all controls in the channels `doubted`, in
-/// which the formula leaves a residual.
+/// The lagged forms that are tried: lags of the controls in the library's formula, and lags of all controls in the
+/// channels `doubted`, in which the formula leaves a residual.
 pub(super) fn forms(library: &Climbed, doubted: &[Channel]) -> Vec<Form> {
     let mut all: Vec<Form> = Vec::new();
     for term in &library.terms {
@@ -27,8 +27,8 @@ pub(super) fn forms(library: &Climbed, doubted: &[Channel]) -> Vec<Form> {
     kept
 }
 
-/// Repeats the search with `lags`, the library's result and the forms indistinguishable from this result. `None` if the model
-/// cannot be evaluated over the flights.
+/// Repeats the search with the forms `lags`, the library's terms, and the forms that are indistinguishable from the
+/// first term. `None` if the model cannot be evaluated over the flights.
 pub(super) fn climb(
     ask: &Ask,
     library: &Climbed,

@@ -1,4 +1,5 @@
-//! Library of shapes: functions of one or two variables. A form multiplies a shape with a known factor of its channel.
+//! Library of shapes: functions of one or two variables. A form is a shape times a known factor that depends on the
+//! channel.
 
 use super::free::Free;
 use greylag_physics::Channel;
@@ -18,7 +19,8 @@ pub(super) const OF_AIR: [Variable; 9] = [
     Variable::Rudder,
     Variable::Throttle,
 ];
-/// Variables of shapes that do not scale with dynamic pressure: thrust, gyroscopic and inertial moments.
+/// Variables of shapes that do not scale with dynamic pressure. Such shapes describe thrust, gyroscopic and inertial
+/// moments.
 pub(super) const BESIDE_AIR: [Variable; 7] = [
     Variable::Throttle,
     Variable::Airspeed,
@@ -38,12 +40,13 @@ pub(super) const CONTROLS: [Variable; 4] =
 const LAG_S: f64 = 0.2;
 /// Longest time constant of a lag, s.
 const LONGEST_LAG_S: f64 = 3.0;
-/// Starting coefficient of a lag. It is so small that the first step changes only the coefficient.
+/// Starting coefficient of a lagged control. It is so small that the first step changes only the coefficient, not the
+/// lag.
 const AMOUNT: f64 = 1e-6;
 /// Thresholds and dead bands, as quantiles of the variable's magnitude in the flights.
 pub(super) const QUANTILES: [f64; 2] = [0.5, 0.75];
 
-/// Dependence of an amount on its variables.
+/// Dependence of a force or moment on its variables, without the coefficient.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
     /// The variable v itself.
@@ -64,7 +67,7 @@ pub enum Shape {
     Beyond(Variable, f64),
     /// The control v through a first-order lag with a time constant, s. The time constant of a candidate is free.
     Lagged(Variable, f64),
-    /// An expression of the free forms.
+    /// An expression of the grammar for free forms.
     Free(&'static Free),
 }
 
@@ -75,12 +78,12 @@ pub struct Form {
     pub channel: Channel,
     /// Whether the form scales with dynamic pressure.
     pub of_air: bool,
-    /// Dependence on its variables.
+    /// The shape, which gives the dependence on the variables.
     pub shape: Shape,
 }
 
 impl Shape {
-    /// Variables of the shape.
+    /// Variables on which the shape depends.
     pub fn variables(&self) -> Vec<Variable> {
         match *self {
             Shape::Product(v, w) | Shape::ByMagnitude(v, w) => vec![v, w],
@@ -95,7 +98,7 @@ impl Shape {
         }
     }
 
-    /// The formula as text, with `names` in place of the constants' values if `names` is given.
+    /// The formula as text. `names` replace the values of the constants if they are given.
     pub fn text(&self, names: Option<&[String]>) -> String {
         let name = Variable::name;
         let number = |c: f64| match names {
@@ -125,7 +128,7 @@ impl Shape {
         }
     }
 
-    /// Size of the formula: number of variables, numbers and operations.
+    /// Size of the formula: number of its variables, numbers and operations.
     pub fn complexity(&self) -> usize {
         match self {
             Shape::Linear(_) => 1,
@@ -139,7 +142,7 @@ impl Shape {
 }
 
 impl Form {
-    /// Factor of the shape, as text.
+    /// Known factor by which the shape is multiplied, as text.
     pub fn factor(&self) -> &'static str {
         let moment = matches!(self.channel, Channel::Roll | Channel::Yaw);
         match (self.of_air, moment, self.channel) {
@@ -150,7 +153,7 @@ impl Form {
         }
     }
 
-    /// Unit of the coefficient.
+    /// Unit of the coefficient; empty if the coefficient is dimensionless.
     pub fn unit(&self) -> String {
         let force = match self.channel {
             Channel::Roll | Channel::Pitch | Channel::Yaw => "N m",
@@ -175,12 +178,12 @@ impl Form {
         format!("{force}{}{}", units.concat(), if squared { units.concat() } else { String::new() })
     }
 
-    /// Identifier among the candidates.
+    /// Identifier of the form as a candidate effect.
     pub fn id(&self) -> String {
         let text = match self.shape {
             // the text is too long for an identifier
             Shape::Free(free) => format!("free_{:x}", number_of(&free.text(None))),
-            // without the time constant, which is free
+            // the time constant is free, so it is not part of the identifier
             Shape::Lagged(v, _) => format!("lag {}", v.name()),
             shape => shape.text(None),
         };
@@ -216,7 +219,8 @@ impl Form {
         }
     }
 
-    /// The effect of a control through a lag. The search starts at `tau` (s) and at 0.75 `tau` to either side.
+    /// The effect of a control through a lag. The search starts at the time constants `tau` (s), 0.25 `tau` and 1.75
+    /// `tau`.
     fn through_lag(&self, v: Variable, tau: f64, id: &str) -> Result<&'static Written, String> {
         register::read(&format!(
             "schema = 1\nid = \"{id}\"\ndescription = \"A control through a lag.\"\nsource = \"greylag propose\"\n\
@@ -255,7 +259,7 @@ impl Form {
     }
 }
 
-/// Forms in `channel` with each control among `of` through a lag.
+/// Forms in `channel` for each control in `of`, through a lag.
 pub fn lags(channel: Channel, of: &[Variable]) -> Vec<Form> {
     let form = |of_air, v| Form { channel, of_air, shape: Shape::Lagged(v, LAG_S) };
     let with_air = of.iter().filter(|v| CONTROLS.contains(v)).map(|v| form(true, *v));
@@ -270,7 +274,7 @@ fn number_of(text: &str) -> u64 {
     })
 }
 
-/// All forms of the library in `channel`. `threshold` returns a quantile of the magnitude of a variable.
+/// All forms of the library in `channel`. `threshold` returns the given quantile of the magnitude of a variable.
 pub fn forms(channel: Channel, threshold: &dyn Fn(Variable, f64) -> f64) -> Vec<Form> {
     let mut shapes: Vec<(bool, Shape)> = Vec::new();
     for (of_air, variables) in [(true, &OF_AIR[..]), (false, &BESIDE_AIR[..])] {

@@ -1,4 +1,5 @@
-//! Search for a formula: term by term on some flights, tested as a whole on others.
+//! Search for a formula, term by term, on some flights, and test of the whole formula on other flights. The terms come
+//! from a library of shapes or are expressions of a grammar (free forms).
 
 use super::beyond::{better, beyond, doubt};
 use super::draft::{self, Term};
@@ -21,7 +22,8 @@ use crate::rudder;
 use greylag_model::{GreyBox, RUDDER};
 use greylag_physics::Channel;
 
-/// Shares of the work: after the diagnosis, before the lags, before the free forms, before the test.
+/// Estimated share of the work that is done after the diagnosis. The next constants are the shares before the lags,
+/// before and after the free forms, and before the test.
 const SEARCHED: f64 = 0.3;
 const LAGS: f64 = 0.5;
 const FREE: [f64; 2] = [0.6, 0.9];
@@ -44,7 +46,7 @@ pub fn propose(
     known(&[&options.without[..], &options.with[..]].concat())?;
     let (problem, searched_on, mut notes) = problem(model, flights, options)?;
     notes.extend(excitation::check(&problem.flights)?);
-    // before the search, which takes minutes
+    // errors in the held-out flights are reported before the search, which takes minutes
     let (test, used, more) = self::problem(model, held_out, options)?;
     notes.extend(more);
     notes.extend(not_used(&model.known, &[&searched_on[..], &used[..]].concat()));
@@ -83,7 +85,7 @@ pub fn propose(
         proposal.sentences.push(nothing(&proposal));
         return Ok(proposal);
     };
-    // further terms show that the form of the first one is incomplete
+    // further terms show that the form of the first term is incomplete
     let whole = terms.len() == 1 && !outdone(&proposal);
     proposal.grades.iter_mut().for_each(|grades| grades.form &= whole);
     report(progress, "testing the formula on flights that the search has not seen", TESTED)?;
@@ -94,7 +96,8 @@ pub fn propose(
     Ok(proposal)
 }
 
-/// Channels in which a formula is searched. If `rudder` moves and the model has no rudder, its channels are left out.
+/// Channels in which a formula is searched for. `rudder` states whether a rudder that is not in the model moves. The
+/// channels on which a rudder acts are then left out.
 fn searched(found: &Found, rudder: bool) -> Vec<Channel> {
     let moved = [Channel::Drag, Channel::Side, Channel::Roll, Channel::Yaw];
     let mut channels = failing(found);
@@ -102,16 +105,16 @@ fn searched(found: &Found, rudder: bool) -> Vec<Channel> {
     channels
 }
 
-/// Whether a free form has more evidence than the adopted formula of the library, which is simpler and removes hardly
-/// less error. The form of the formula is then not certain. The evidences come from different tunings of the model and
-/// are not strictly comparable, so they only withhold the grade.
+/// Whether a free form that was not chosen has more evidence than the chosen formula of the library. The form of the
+/// chosen formula is then not certain. The two values of evidence are not strictly comparable, because they come from
+/// different estimates of the model. They therefore affect only the statement that the form is certain.
 fn outdone(proposal: &Proposal) -> bool {
     let best = |rungs: &[Rung]| rungs.iter().map(|r| r.evidence).fold(0.0, f64::max);
     let free = proposal.free.as_ref().filter(|free| !free.chosen);
     free.is_some_and(|free| best(&free.front) > best(&proposal.front))
 }
 
-/// A proposal before any search.
+/// A proposal before the search for a formula, without results.
 fn empty(
     model: &GreyBox,
     verdict: Verdict,
@@ -157,7 +160,8 @@ fn conclude(proposal: &mut Proposal, first: &Term, terms: &[Term], tested: HeldO
     proposal.held_out = Some(tested);
 }
 
-/// The library's formula, or a better formula with lagged controls or free forms.
+/// Returns the library's formula, or a better formula with lagged controls or free forms. Records the free forms in
+/// `proposal`.
 fn beyond_library(
     ask: &Ask,
     library: Climbed,
@@ -191,7 +195,7 @@ fn beyond_library(
     Ok(if taken { free } else { library })
 }
 
-/// Why nothing is proposed; `None` if the diagnosis leaves a residual unexplained.
+/// Sentence that states why no formula is searched for; `None` if the diagnosis leaves a residual unexplained.
 fn settled(found: &Found, verdict: Verdict) -> Option<String> {
     match verdict {
         Verdict::Unexplained => None,

@@ -20,24 +20,24 @@ pub struct Grades {
 /// A form that the flights cannot distinguish from the first term.
 #[derive(Clone, Debug, Serialize)]
 pub struct Alternative {
-    /// Formula, as text.
+    /// The formula, as text.
     pub formula: String,
     /// Evidence of the form.
     pub evidence: f64,
 }
 
-/// A step of the search: the formula with one more term.
+/// A formula of the search. It has one term more than the previous formula, or it is the best free form of its size.
 #[derive(Clone, Debug, Serialize)]
 pub struct Rung {
-    /// Formula, as text.
+    /// The formula, as text.
     pub formula: String,
-    /// Number of variables, numbers and operations in it, its coefficients included.
+    /// Size of the formula: number of its variables, numbers and operations, with its coefficients.
     pub complexity: usize,
-    /// Share of the error beyond noise in the searched channels that the formula removes.
+    /// Share of the residual variance beyond noise in the searched channels that the formula removes.
     pub removed: f64,
-    /// Evidence of its last term.
+    /// Evidence of the last term of the formula.
     pub evidence: f64,
-    /// Evidence that chance reaches in the same search over null flights.
+    /// Critical value of the evidence, from the same search on bootstrap draws under the null hypothesis.
     pub threshold: f64,
     /// Whether this formula is the chosen one.
     pub chosen: bool,
@@ -48,24 +48,25 @@ pub struct Rung {
 pub struct HeldOut {
     /// Names of the flights.
     pub flights: Vec<String>,
-    /// Share of the error beyond noise in its channels that the formula removes.
+    /// Share of the residual variance beyond noise, in the formula's channels, that the formula removes.
     pub removed: f64,
-    /// Reduction of the squared error, in units of the noise's variance.
+    /// Reduction of the residual sum of squares, in units of the noise's variance.
     pub fall: f64,
-    /// Reduction that chance reaches.
+    /// Largest reduction in bootstrap draws under the null hypothesis that no effect is missing; at least 0.
     pub threshold: f64,
 }
 
-/// Result of the search over free forms, made if the library's shapes do not suffice.
+/// Result of the search over free forms. It is made if the library's shapes do not suffice.
 #[derive(Clone, Debug, Serialize)]
 pub struct FreeForms {
     /// Reason for the search.
     pub why: String,
     /// Number of forms evaluated, over all channels.
     pub tried: usize,
-    /// The best form of each size that removes more than all smaller ones, by channel, with fitted constants.
+    /// The best form of each size, by channel, with fitted constants. A form is listed only if it removes more than all
+    /// smaller forms.
     pub front: Vec<Rung>,
-    /// Whether one of them is part of the formula found.
+    /// Whether one of these forms is part of the chosen formula.
     pub chosen: bool,
 }
 
@@ -74,7 +75,7 @@ pub struct FreeForms {
 pub struct Settings {
     /// Seed of all random draws.
     pub seed: u64,
-    /// Number of bootstrap draws under the null hypothesis, which determine the thresholds.
+    /// Number of bootstrap draws under the null hypothesis, which determine the critical values.
     pub nulls: usize,
     /// Ids excluded from the catalogue.
     pub without: Vec<String>,
@@ -93,27 +94,27 @@ pub struct Proposal {
     pub model: String,
     /// Verdict of the preceding diagnosis.
     pub verdict: Verdict,
-    /// The answer in plain sentences.
+    /// The result in plain sentences, the most important first.
     pub sentences: Vec<String>,
-    /// Formulas of the search, each with one more term than the one before.
+    /// Formulas of the search, each with one more term than the previous one.
     pub front: Vec<Rung>,
-    /// The search of free forms, if one was made.
+    /// The search over free forms; `None` if it was not made.
     pub free: Option<FreeForms>,
     /// Forms that these flights cannot distinguish from the first term.
     pub alike: Vec<Alternative>,
-    /// Properties of the first term that are certain.
+    /// Properties of the first term that are certain; `None` without a term.
     pub grades: Option<Grades>,
-    /// Test on held-out flights.
+    /// Test on held-out flights; `None` if there is no formula to test.
     pub held_out: Option<HeldOut>,
-    /// Number of the library's shapes evaluated, lagged controls included.
+    /// Number of shapes of the library that were evaluated, with lagged controls.
     pub tried: usize,
-    /// Reasons not to propose the formula found; empty if it is proposed.
+    /// Reasons not to propose the formula; empty if it is proposed.
     pub refused: Vec<String>,
     /// Settings of the search.
     pub settings: Settings,
-    /// Best evidence over all forms in each null flight.
+    /// Evidence of the best form in each bootstrap draw under the null hypothesis.
     pub nulls: Vec<f64>,
-    /// The effect file, if one is proposed.
+    /// Text of the effect file; `None` if no formula is proposed.
     pub effect: Option<String>,
     /// Further notes for the reader.
     pub notes: Vec<String>,

@@ -14,7 +14,7 @@ pub(super) fn capital(text: &str) -> String {
     letters.next().map_or(String::new(), |c| c.to_uppercase().chain(letters).collect()) + "."
 }
 
-/// The proposal in sentences.
+/// Describes the proposal in sentences: terms, certain properties, free forms, test.
 pub(super) fn sentences(
     proposal: &Proposal,
     first: &Term,

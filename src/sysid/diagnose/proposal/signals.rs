@@ -11,7 +11,7 @@ use crate::flight_path::reconstruction::Reconstruction;
 use greylag_model::GreyBox;
 use greylag_physics::formula::file::channel_name;
 
-/// The residual of `model`, tuned to `flights` with sensor errors removed, as CSV.
+/// Returns the residual of `model` as a CSV table, after the model and the sensor errors have been fitted to `flights`.
 ///
 /// Each window of the weak form (0.37 s, half overlapping) has one row. The columns are the index in `flights` from 0,
 /// the mean of each variable over the window (SI units), dynamic pressure times wing area (`qbar_S`, N), and the
@@ -54,7 +54,7 @@ pub fn signals(
     Ok(text)
 }
 
-/// Index in `all` of each of the flights `used`. Flights that are too short are not used.
+/// Index in `all` of each flight of `used`, which leaves out the flights that are too short.
 fn numbers(used: &[&Reconstruction], all: &[Reconstruction]) -> Vec<usize> {
     let number = |flight: &&Reconstruction| all.iter().position(|f| std::ptr::eq(f, *flight));
     used.iter().filter_map(number).collect()

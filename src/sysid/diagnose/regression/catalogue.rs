@@ -1,4 +1,5 @@
-//! Candidates of a diagnosis: the effects that a model lacks, with their regressor columns.
+//! Candidates of a diagnosis: effects that a model lacks, with their regressors. A shape constant is a coefficient in
+//! which an effect is nonlinear.
 
 use rayon::prelude::*;
 
@@ -15,30 +16,30 @@ use greylag_physics::size::Size;
 
 /// Finite-difference step of a shape constant, as a share of its value.
 const MOVED: f64 = 0.02;
-/// Largest change of a shape constant within which its linearisation is used, as a share of its value.
+/// Largest change of a shape constant from its point of linearisation, as a share of its value.
 pub const REACH: f64 = 0.35;
 
-/// Factor between successive points that are weaker than an input effect's first starting value.
+/// Factor between successive points of linearisation that are weaker than an input effect's first starting value.
 const SMALLER: f64 = 2.5;
 
-/// An effect that may be missing.
+/// A candidate effect, which the model may lack.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
     /// Description of the effect.
     pub about: Description,
-    /// Whether it is an input effect, which acts on the deflections.
+    /// Whether the effect acts on the deflections (input effect), as an actuator lag does.
     pub operator: bool,
 }
 
 impl Entry {
-    /// Whether the effect comes from an effect file and therefore has no prior on its coefficients.
+    /// Whether the effect comes from an effect file. The coefficients of such an effect have no prior.
     fn written(&self) -> bool {
         Kind::from_id(self.about.id).is_some_and(|kind| kind.written().is_some())
     }
 }
 
-/// The effects that `model` lacks and that can be searched for, without those in `without`. They are effects of the catalogue
-/// and the effects from files in `with`.
+/// Candidate effects for `model`: effects of the catalogue, and the effects `with` from effect files. The effects
+/// `without`, effects that `model` already has, and effects that cannot be searched for are left out.
 pub fn candidates(model: &GreyBox, with: &[String], without: &[String]) -> Vec<Entry> {
     let of = |about: Description, operator| Entry { about, operator };
     let physical = on_air().map(|about| of(about, false));
@@ -61,16 +62,16 @@ pub fn candidates(model: &GreyBox, with: &[String], without: &[String]) -> Vec<E
         .collect()
 }
 
-/// Columns of candidates over all flights. The lists of all flights have the same length.
+/// Regressors of the candidates for all flights.
 pub struct Columns {
-    /// The candidates, which refer to columns by index.
+    /// The candidates, which refer to their columns by index.
     pub trials: Vec<Trial>,
-    /// Columns of each flight.
+    /// Columns by flight. All flights have the same number of columns.
     pub columns: Vec<Vec<Column>>,
 }
 
-/// Columns of `entries` for `flights` under `model`. `refined` holds additional points at which nonlinear candidates are
-/// linearised.
+/// Computes the regressors of the candidates `entries` for `flights` under `model`. `refined` holds additional points
+/// at which nonlinear candidates are linearised: identifier and coefficients.
 pub fn columns(
     model: &GreyBox,
     flights: &[Ready],
@@ -113,7 +114,8 @@ fn starts(entry: &Entry) -> &'static [&'static [f64]] {
     entry.about.entry.map_or(&[], |e| e.starts)
 }
 
-/// Points at which an input effect is weaker than at its first starting value. Accurate sensors may detect such weak effects.
+/// Points of linearisation at which an input effect is weaker than at its first starting value. Accurate sensors may
+/// detect such weak effects. Empty for all other effects.
 fn smaller(entry: &Entry) -> Vec<Vec<f64>> {
     let (Some(first), Some(last)) = (starts(entry).first(), starts(entry).last()) else {
         return Vec::new();
@@ -121,7 +123,7 @@ fn smaller(entry: &Entry) -> Vec<Vec<f64>> {
     if !entry.operator {
         return Vec::new();
     }
-    // decreasing starting values are limits: a higher limit is a weaker effect
+    // decreasing starting values belong to a limit: a higher limit is a weaker effect
     let factor = if first[0] < last[0] { 1.0 / SMALLER } else { SMALLER };
     vec![vec![first[0] * factor.powi(2)], vec![first[0] * factor]]
 }
@@ -131,8 +133,8 @@ pub fn straight(entry: &Entry) -> bool {
     starts(entry).is_empty()
 }
 
-/// `model` with all of `entries` that can join it, and these entries with their values. The values are zero or the bound
-/// nearest to zero.
+/// Adds all of `entries` to `model`, except those that cannot be added. Returns this model, and the added entries with
+/// their coefficients. The coefficients are zero or the bound nearest to zero.
 pub fn with_all(model: &GreyBox, entries: &[Entry]) -> (GreyBox, Vec<(Entry, Vec<f64>)>) {
     let mut everything = model.clone();
     let mut joined = Vec::new();
@@ -143,14 +145,15 @@ pub fn with_all(model: &GreyBox, entries: &[Entry]) -> (GreyBox, Vec<(Entry, Vec
             joined.push((*e, values));
         }
     }
-    // coefficients that joined effects would replace keep their values
+    // added effects may set coefficients to zero that they replace: these get their values back
     for c in model.coefficients() {
         everything.set_coefficient(&c.name, c.value);
     }
     (everything, joined)
 }
 
-/// Indices of the coefficients that a search estimates: all except linear coefficients that are 1 in every starting point.
+/// Indices of the coefficients that a search estimates: all except linear coefficients that are 1 in every starting
+/// point of the effect.
 pub fn free(entry: &Entry) -> Vec<usize> {
     let linear = entry.about.coefficients.len() - entry.about.shape;
     (0..entry.about.coefficients.len())
@@ -161,7 +164,7 @@ pub fn free(entry: &Entry) -> Vec<usize> {
 }
 
 impl Columns {
-    /// Adds the linear candidates. One model with all of `entries` at zero gives their columns in one pass.
+    /// Adds the linear candidates. One model with all of `entries` gives their columns in a single pass.
     fn add_linear(&mut self, model: &GreyBox, flights: &[Ready], entries: &[Entry]) {
         let (everything, joined) = with_all(model, entries);
         let wanted = model.coefficients().len()..everything.coefficients().len();
@@ -218,13 +221,13 @@ impl Columns {
         });
     }
 
-    /// Whether a column has a nonzero entry.
+    /// Whether a column has a nonzero entry in any flight.
     fn acts(&self, column: usize) -> bool {
         let moved = |x: &f64| *x != 0.0;
         self.columns.iter().any(|list| list[column].iter().flatten().any(moved))
     }
 
-    /// Records the channels in which a trial acts, and keeps the trial if it acts in any channel.
+    /// Records the channels in which the candidate `trial` acts. Keeps the candidate if it acts in any channel.
     fn finish(&mut self, mut trial: Trial, flights: &[Ready]) {
         let own: Vec<usize> = trial
             .points
@@ -238,7 +241,7 @@ impl Columns {
             if acts {
                 let finite =
                     |f: &Ready| f.residual[channel].iter().filter(|x| x.is_finite()).count();
-                // neighbouring windows overlap by half
+                // neighbouring windows overlap by half, so only half of the rows are independent
                 trial.support += 0.5 * flights.iter().map(finite).sum::<usize>() as f64;
             }
         }
@@ -248,8 +251,8 @@ impl Columns {
     }
 }
 
-/// Columns of a nonlinear candidate at `values` for each flight: the contribution, then the derivatives with respect to the
-/// free coefficients. `None` if the candidate cannot join the model with these values.
+/// Columns of a nonlinear candidate at `values` for each flight: the contribution, then the derivatives with respect to
+/// the free coefficients. `None` if the candidate cannot be added to the model with these values.
 fn curved_columns(
     model: &GreyBox,
     flights: &[Ready],

@@ -1,4 +1,5 @@
-//! Division of flights into cells. A cell is one channel of one flight, with its finite windows in runs and blocks.
+//! Division of the windows of all flights into cells. A cell contains the windows of one channel of one flight in which
+//! the residual is finite. A run is a sequence of adjacent windows. A block is a stretch of about 4 s.
 
 use nalgebra::DMatrix;
 
@@ -13,27 +14,27 @@ pub const BLOCK_S: f64 = 4.0;
 /// Columns of one flight with their indices among all columns.
 pub type Placed = Vec<(usize, Column)>;
 
-/// One channel of one flight.
+/// The windows of one channel of one flight.
 #[derive(Clone, Debug)]
 pub struct Cell {
     /// Index of the flight.
     pub flight: usize,
     /// Index of the channel.
     pub channel: usize,
-    /// Indices of the finite windows, ascending.
+    /// Indices of the windows with a finite residual, ascending.
     pub windows: Vec<usize>,
-    /// Ends of the runs of neighbouring windows, as indices into `windows`.
+    /// End of each run of adjacent windows, exclusive, as an index into `windows`.
     pub runs: Vec<usize>,
-    /// Block number of each window, unique over all flights.
+    /// Number of the block of each window. The numbers are unique over all flights.
     pub blocks: Vec<usize>,
 }
 
 /// The cells of all flights, with the flight of every block.
 #[derive(Clone, Debug)]
 pub struct Cells {
-    /// Cells by flight and channel; cells without windows are left out.
+    /// Cells in the order of flights, then channels. Cells without windows are left out.
     pub list: Vec<Cell>,
-    /// The flight of each block.
+    /// Index of the flight of each block.
     pub flight_of_block: Vec<usize>,
 }
 
@@ -53,7 +54,7 @@ impl Cells {
         cells
     }
 
-    /// Block number of each window of `ready`: a segment is divided into equal blocks of about `BLOCK_S`.
+    /// Number of the block of each window of `ready`. Each segment is divided into equal blocks of about `BLOCK_S`.
     fn number(&mut self, flight: usize, ready: &Ready) -> Vec<usize> {
         let windows = &ready.acting.windows;
         let mut block_of = Vec::with_capacity(windows.len());
@@ -93,7 +94,7 @@ fn cell(flight: usize, channel: usize, ready: &Ready, block_of: &[usize]) -> Cel
 }
 
 impl Cell {
-    /// The runs of `values`, which has one entry for each window of the flight.
+    /// Splits `values` into the runs of the cell. `values` has one entry for each window of the flight.
     pub fn split(&self, values: &[f64]) -> Vec<Vec<f64>> {
         let mut start = 0;
         let cut = |&end: &usize| {
@@ -104,12 +105,13 @@ impl Cell {
         self.runs.iter().map(cut).collect()
     }
 
-    /// Whitened `values`, one entry for each finite window.
+    /// Whitens `values`, which has one entry for each window of the flight. Returns one entry for each window of the
+    /// cell.
     pub fn whitened(&self, values: &[f64], whitener: &Whitener) -> Vec<f64> {
         self.split(values).iter().flat_map(|run| whitener.apply(run)).collect()
     }
 
-    /// The whitened columns of `placed` that act in the channel, with their indices.
+    /// Returns the whitened columns of `placed` that are not zero in the channel, with their indices.
     pub fn matrix(&self, placed: &Placed, whitener: &Whitener) -> (Vec<usize>, DMatrix<f64>) {
         let mut places = Vec::new();
         let mut data = Vec::new();
@@ -122,7 +124,7 @@ impl Cell {
         (places.clone(), DMatrix::from_vec(self.windows.len(), places.len(), data))
     }
 
-    /// Rows of each block: block number, first row, last row + 1.
+    /// Rows of each block in the cell: block number, first row, last row + 1.
     pub fn rows_of_blocks(&self) -> Vec<(usize, usize, usize)> {
         let mut rows: Vec<(usize, usize, usize)> = Vec::new();
         for (row, block) in self.blocks.iter().enumerate() {

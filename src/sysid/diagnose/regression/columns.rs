@@ -1,4 +1,5 @@
-//! Regressor columns: change of a flight's residual for one unit of each unknown, window by window.
+//! Regressors (columns) of nuisance parameters and candidates. A column holds the change of forces and moments for one
+//! unit of a parameter, window by window.
 
 use std::ops::Range;
 
@@ -12,10 +13,16 @@ use greylag_model::GreyBox;
 use greylag_physics::rigid_body::{self, RigidBody, Vector};
 use greylag_physics::{Channel, Wrench};
 
-/// Number of sensor-error columns: gyros p, q, r (rad/s), α, β (rad), airspeed (relative), accelerometers x, y, z
-/// (m/s²), then the delays (s) of α, β, airspeed, accelerometers, of the angular accelerations relative to the moments,
-/// and of the recorded actuators. The last column is the actuators' blur: half the variance of the time over which a
-/// record is averaged, in squared sampling intervals.
+/// Number of sensor errors of a flight. Their order is:
+/// - biases of the gyros p, q, r, rad/s;
+/// - biases of α and β, rad;
+/// - relative error of the airspeed;
+/// - biases of the accelerometers x, y, z, m/s²;
+/// - delays of α, β, airspeed and accelerometers, s;
+/// - delay of the angular accelerations relative to the moments, s;
+/// - delay of the actuator record, s;
+/// - averaging ("blur") of the actuator record: half of the variance of the times over which a record is averaged, in
+///   squared sampling intervals.
 pub const SENSORS: usize = 16;
 
 /// A flight evaluated under a model.
@@ -23,15 +30,16 @@ pub const SENSORS: usize = 16;
 pub struct Ready {
     /// The flight as measured.
     pub measured: Prepared,
-    /// The same flight with the deflections that act under the model.
+    /// The flight with deflections that have passed the model's input effects, for example an actuator lag.
     pub acting: Prepared,
-    /// Residual, measured less predicted.
+    /// Residual, measured minus predicted: forces in N, moments in N m.
     pub residual: Column,
-    /// Change of the residual for one unit of each sensor error.
+    /// Change of the residual for one unit of each sensor error, in the order of [`SENSORS`].
     pub sensors: Vec<Column>,
     /// Derivatives of the prediction with respect to aileron, elevator and throttle, by segment and sample.
     controls: Vec<Vec<[[f64; CHANNELS]; 3]>>,
-    /// Model that predicts the aircraft's accelerations; `None` for the model of the residual.
+    /// Model that predicts the accelerations in the regressors of mass and inertia. `None` for the model of the
+    /// residual.
     accelerating: Option<GreyBox>,
 }
 
@@ -45,7 +53,7 @@ impl Ready {
             .map(|s| s.iter().map(|at| local::local(model, at, &at.controls)).collect())
             .collect();
         let mut columns = gather(&acting, model.integrator, 1 + INPUTS + 3 + 7, |place, add| {
-            // RK4 also evaluates the end of a step; the derivatives there are approximated by those at the start
+            // RK4 also evaluates the end of a step; its derivatives are approximated by those at the start
             let here = &locals[place.segment][place.index];
             let value = if place.at.time_s == acting.segments[place.segment][place.index].time_s {
                 here.value
@@ -82,7 +90,7 @@ impl Ready {
                 let slope = &here.slope[CONTROLS + i];
                 (0..CHANNELS).for_each(|c| add(1 + INPUTS + 9, c, bend * slope[c]));
             }
-            // J ω̇ + ω × J ω = M(t − T), for explicit Euler steps of 2 T: T Σ ∂(ω × J ω − M)/∂x ẋ
+            // delay T of the angular acceleration, J ω̇ + ω × J ω = M(t − T), to first order: T Σ ∂(ω × J ω − M)/∂x ẋ
             if acting.sampling == Sampling::Instants {
                 let rates = differences(&acting, place.segment, place.index, inputs);
                 for (slope, rate) in here.slope.iter().zip(rates) {
@@ -109,15 +117,17 @@ impl Ready {
         Ready { measured: flight.clone(), acting, residual, sensors, controls, accelerating }
     }
 
-    /// Uses accelerations predicted by another model in the columns of mass and inertia.
+    /// Replaces the model whose predicted accelerations enter the regressors of mass and inertia. `None` stands for the
+    /// model of the residual.
     pub fn accelerating_as(self, model: Option<&GreyBox>) -> Ready {
         Ready { accelerating: model.cloned(), ..self }
     }
 
-    /// Predictions for one unit of each of the coefficients `wanted` of `model`. `model` must contain the effects of
-    /// the flight's model. The columns of shape constants and of coefficients of input effects are empty.
+    /// Regressors of the coefficients `wanted` of `model`: predicted forces and moments for one unit of each
+    /// coefficient. `model` must contain the effects of the flight's model. The columns of shape constants (nonlinear
+    /// coefficients) and of coefficients of input effects are empty.
     pub fn linear(&self, model: &GreyBox, wanted: Range<usize>) -> Vec<Column> {
-        // a formula with a lag needs the past of the deflections, which the flight's own model may not remember
+        // a formula with a lag needs earlier deflections, which the flight's own model may not have stored
         let remembered = (model.lags() > 0).then(|| self.measured.acting(model));
         let acting = remembered.as_deref().unwrap_or(&self.acting);
         let mut columns = gather(acting, model.integrator, wanted.len(), |place, add| {
@@ -154,8 +164,8 @@ impl Ready {
         columns
     }
 
-    /// Change of the residual for one unit of a parameter. A change of the parameter by `step` changes the rigid body
-    /// to `body`. The accelerations are predicted, because measured accelerations share the residual's noise.
+    /// Regressor of a parameter of mass or inertia. A change of the parameter by `step` changes the rigid body to
+    /// `body`. The accelerations are predicted, because measured accelerations contain the same noise as the residual.
     fn body(&self, model: &GreyBox, body: &RigidBody, step: f64) -> Column {
         let old = &model.body;
         let model = self.accelerating.as_ref().unwrap_or(model);
@@ -179,8 +189,8 @@ impl Ready {
         columns.pop().unwrap_or_default()
     }
 
-    /// Difference between the predictions of `model` and of the flight's model, from which it differs in an input
-    /// effect, to first order in deflections and throttle.
+    /// Contribution of an input effect that `model` has in addition to the flight's model: difference of the
+    /// predictions of both models, to first order in the changes of deflections and throttle.
     pub fn operator(&self, model: &GreyBox) -> Column {
         let other = self.measured.acting(model);
         let mut columns = gather(&self.acting, model.integrator, 1, |place, add| {
@@ -195,7 +205,7 @@ impl Ready {
     }
 }
 
-/// `Σ weights · columns`.
+/// Sum of `columns`, weighted with `weights`.
 pub fn combine(columns: &[Column], weights: &[f64]) -> Column {
     let mut sum = Column::default();
     for (column, weight) in columns.iter().zip(weights) {
@@ -214,13 +224,13 @@ fn join(a: &mut Vec<f64>, b: Vec<f64>) {
     }
 }
 
-/// Whether mass or inertia of `model` depends on its coefficient `index`.
+/// Whether mass or inertia of `model` depends on the coefficient with the index `index`.
 pub fn of_body(model: &GreyBox, index: usize) -> bool {
     changed_body(model, index).is_some()
 }
 
-/// The rigid body of `model` after a perturbation of the coefficient `index`, and the perturbation. `None` if the body
-/// does not depend on the coefficient.
+/// Perturbs the coefficient `index` of `model`. Returns the resulting rigid body and the perturbation. `None` if the
+/// body does not depend on the coefficient.
 fn changed_body(model: &GreyBox, index: usize) -> Option<(RigidBody, f64)> {
     const MOVED: f64 = 1e-3;
     let mut moved = model.clone();
@@ -229,7 +239,7 @@ fn changed_body(model: &GreyBox, index: usize) -> Option<(RigidBody, f64)> {
     (moved.body != model.body).then_some((moved.body, MOVED))
 }
 
-/// Adds the moment of the measured angular acceleration to the residual.
+/// Adds J ω̇, the moment of the measured angular acceleration, to the residual.
 fn add_spin(model: &GreyBox, flight: &Prepared, residual: &mut Column) {
     let spins = rates(flight, |i| [i.state.p, i.state.q, i.state.r]);
     let moments: Vec<Vector<f64>> = spins.iter().map(|w| inertia(&model.body, *w)).collect();
@@ -250,7 +260,7 @@ fn inputs(i: &Instant) -> [f64; INPUTS] {
     [s.p, s.q, s.r, s.alpha, s.beta, s.airspeed, aileron, elevator, throttle, rudder]
 }
 
-/// Second differences of aileron, elevator, throttle and rudder, in this order.
+/// Second differences of aileron, elevator, throttle and rudder, in this order, at one sample.
 pub fn bends(flight: &Prepared, segment: usize, index: usize) -> [f64; 4] {
     let instants = &flight.segments[segment];
     let (before, after) = (index.saturating_sub(1), (index + 1).min(instants.len() - 1));
@@ -258,7 +268,7 @@ pub fn bends(flight: &Prepared, segment: usize, index: usize) -> [f64; 4] {
     [0, 1, 2, 3].map(|k| a[k] - 2.0 * b[k] + c[k])
 }
 
-/// Rates of `of` by central differences, 1/s.
+/// Time derivatives of the quantities `of` at one sample, by central differences.
 fn differences<const N: usize>(
     flight: &Prepared,
     segment: usize,

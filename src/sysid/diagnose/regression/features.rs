@@ -14,29 +14,29 @@ use greylag_num::stream::{Stream, stream};
 
 /// Number of the random stream for the features.
 const FEATURES: u64 = 81;
-/// Number of cosines.
+/// Number of cosines among the features.
 const COSINES: usize = 40;
-/// Number of variables: α, β, V, p, q, r, present aileron, elevator and throttle, earlier aileron and elevator less the
-/// present ones, rate of α.
+/// Number of variables: α, β, V, p, q, r; present aileron, elevator and throttle; earlier minus present aileron and
+/// elevator; rate of α.
 const VARIABLES: usize = 12;
 /// Number of features: the variables themselves and the cosines.
 pub const COUNT: usize = VARIABLES + COSINES;
 /// Standard deviation of the cosines' frequencies, rad per standard deviation of a variable. A feature varies by about one
 /// half-period over the flights.
 const BEND: f64 = 0.5;
-/// Time over which α is differenced to its rate, s. A shorter time would amplify noise.
+/// Time span of the difference quotient for the rate of α, s. A shorter time would amplify noise.
 const SPAN_S: f64 = 0.06;
 /// Delay of the earlier deflections, s.
 const AGO_S: f64 = 0.08;
 
-/// Frequency of a cosine along each variable, and its phase.
+/// Frequency of a cosine along each variable (rad per standard deviation of the variable), and its phase (rad).
 struct Cosine {
     frequency: [f64; VARIABLES],
     phase: f64,
 }
 
-/// Columns of the features for every flight, multiplied by dynamic pressure times wing area (N). All force channels have the
-/// same columns, and all moment channels.
+/// Columns of the features for every flight, multiplied by dynamic pressure times wing area (N). All force channels
+/// have the same columns. All moment channels have the same columns.
 pub fn features(model: &GreyBox, flights: &[Ready], seed: u64) -> Vec<Vec<Column>> {
     let spread = spread(flights, variables);
     let mut random = stream(seed, &[FEATURES]);
@@ -95,8 +95,8 @@ fn variables(flight: &Prepared, segment: usize, index: usize) -> [f64; VARIABLES
     ]
 }
 
-/// Mean and standard deviation of each variable over all flights. `of` returns the variables for a flight, the index of a
-/// segment and the index of a sample.
+/// Mean and standard deviation of each variable over all flights. `of` returns the variables of a flight at a given
+/// segment and sample.
 pub fn spread<const N: usize>(
     flights: &[Ready],
     of: impl Fn(&Prepared, usize, usize) -> [f64; N],
@@ -120,7 +120,7 @@ pub fn spread<const N: usize>(
     })
 }
 
-/// Standardised variables: `raw` less the mean, in standard deviations.
+/// Standardised variables: `raw` minus the mean, in standard deviations.
 pub fn standard<const N: usize>(raw: [f64; N], spread: &[[f64; 2]; N]) -> [f64; N] {
     std::array::from_fn(|k| (raw[k] - spread[k][0]) / spread[k][1])
 }

@@ -1,4 +1,5 @@
-//! Kernel averages over every window of a flight. Overlapping windows share the evaluation of a sample.
+//! Averages over every window of a flight, weighted by the kernel. Overlapping windows share the evaluation of a
+//! sample.
 
 use rayon::prelude::*;
 
@@ -17,23 +18,24 @@ const GROUP: usize = 16;
 /// Largest number of windows to which one sample contributes.
 const OVERLAP: usize = 4;
 
-/// A sample to evaluate.
+/// A sample at which forces and moments are evaluated.
 #[derive(Clone, Copy, Debug)]
 pub struct Place<'a> {
     /// Index of the sample's segment.
     pub segment: usize,
     /// Index of the sample in its segment.
     pub index: usize,
-    /// Sample with the state.
+    /// The sample whose state is used.
     pub at: &'a Instant,
-    /// Controls for the evaluation.
+    /// Controls that are used in the evaluation.
     pub controls: &'a Controls,
 }
 
-/// Averages the amounts that `evaluate` reports with `add(column, channel, amount)` over each window.
+/// Averages forces and moments over each window and returns them as `columns` columns. At each sample, `evaluate`
+/// reports the terms of the average with `add(column, channel, amount)`.
 ///
-/// Forces are averaged over the samples. Moments are averaged over integration steps, or over the samples if these are values
-/// at instants.
+/// Forces are averaged over the samples. Moments are averaged over integration steps, or over the samples if these are
+/// values at instants.
 pub fn gather(
     flight: &Prepared,
     integrator: Integrator,

@@ -18,17 +18,17 @@ pub const ALPHA: usize = 3;
 /// Index of the aileron; elevator, throttle and rudder follow.
 pub const CONTROLS: usize = 6;
 
-/// Measured less predicted at one sample, without the angular acceleration's moment, which the kernel computes from
-/// the rates.
+/// Residual (measured minus predicted) at one sample. It lacks the moment of the angular acceleration, which the kernel
+/// computes from the rates.
 #[derive(Clone, Copy, Debug)]
 pub struct Local {
-    /// The residual; forces NaN where the log has no specific force.
+    /// The residual, N or N m. Forces are NaN if the log has no specific force.
     pub value: [f64; CHANNELS],
     /// Derivatives of the residual with respect to the inputs, in their order.
     pub slope: [[f64; CHANNELS]; INPUTS],
 }
 
-/// The residual of `model` at `at` with `controls`.
+/// Computes the residual of `model` and its derivatives at the sample `at` with `controls`.
 pub fn local(model: &GreyBox, at: &Instant, controls: &Controls) -> Local {
     type D = Dual<INPUTS>;
     let s = &at.state;

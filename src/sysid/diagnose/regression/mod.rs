@@ -1,4 +1,5 @@
-//! The regression of the ranking: columns, whitening, elimination of nuisance parameters (Frisch–Waugh–Lovell).
+//! Regression for the ranking of candidates: regressors, whitening, elimination of nuisance parameters
+//! (Frisch–Waugh–Lovell).
 
 pub(super) mod catalogue;
 pub(super) mod cells;

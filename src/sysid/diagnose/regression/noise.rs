@@ -1,5 +1,5 @@
-//! Noise of each channel: spectrum, level, and residuals by blocks. It is estimated from the residual of a rich fit,
-//! a fit with the columns of all coefficients and candidates.
+//! Noise of each channel: whitening filter, variance, and whitened noise by block. The noise is the residual of a ridge
+//! regression on the columns of all coefficients and candidates (rich fit).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -9,9 +9,9 @@ use crate::diagnose::regression::whiten::Whitener;
 
 /// Order of the autoregressive whitening.
 const ORDER: usize = 8;
-/// Ridge parameter of the rich fit, relative to a column's squared norm.
+/// Ridge parameter of the regression, relative to a column's squared norm.
 const RIDGE: f64 = 1e-4;
-/// Number of alternations between whitening and fit.
+/// Number of alternations between whitening and regression.
 const PASSES: usize = 2;
 
 /// Noise of every channel.
@@ -19,14 +19,14 @@ const PASSES: usize = 2;
 pub struct Noise {
     /// Whitener of each channel.
     pub whiteners: [Whitener; CHANNELS],
-    /// Whitened residual of the rich fit, one list for each cell. Each block is corrected for the reduction of its variance by
-    /// the fit.
+    /// Whitened residual of the regression, one list for each cell. The regression reduces the variance of each block;
+    /// the residual is corrected for this reduction.
     pub residuals: Vec<Vec<f64>>,
 }
 
 impl Noise {
-    /// Estimates the noise as the residual of column `last` after a fit by the other columns. `rich` has the columns of
-    /// each flight.
+    /// Estimates the noise as the residual of a regression of the column `last` on all other columns. `rich` holds the
+    /// columns by flight.
     pub fn estimate(cells: &Cells, rich: &[Placed], last: usize) -> Noise {
         let mut residuals = vec![Vec::new(); cells.list.len()];
         let whiteners = std::array::from_fn(|channel| {
@@ -40,7 +40,7 @@ impl Noise {
     }
 }
 
-/// Whitened rows of a channel: columns of the rich fit, then the residual.
+/// Whitened rows of one cell: regressors, then the residual that is fitted.
 struct Rows {
     x: DMatrix<f64>,
     y: DVector<f64>,
@@ -92,7 +92,7 @@ fn rows(cell: &Cell, rich: &[Placed], last: usize, whitener: &Whitener) -> Rows 
     Rows { x, y }
 }
 
-/// A ridge regression on scaled columns.
+/// Solution of a ridge regression with scaled columns.
 struct Fit {
     scale: DVector<f64>,
     inverse: Cholesky<f64, Dyn>,
@@ -120,8 +120,8 @@ impl Fit {
         Some(Fit { scale, inverse, solution })
     }
 
-    /// The residual of `rows`, with each block b multiplied by (I − H_bb)^(−1/2). This restores the variance before the fit (Bell
-    /// and McCaffrey 2002, "CR2").
+    /// The residual of `rows`, with each block b multiplied by (I − H_bb)^(−1/2), where H is the hat matrix. This
+    /// restores the variance before the regression (Bell and McCaffrey 2002, "CR2").
     fn unshrunk(&self, cell: &Cell, rows: &Rows) -> Vec<f64> {
         let left = &rows.y - &rows.x * &self.solution;
         let mut out = vec![0.0; left.len()];
@@ -137,7 +137,7 @@ impl Fit {
                 .unwrap_or_else(|| DMatrix::zeros(scaled.nrows(), scaled.ncols()));
             let hat = half.tr_mul(&half);
             let turn = (DMatrix::identity(to - from, to - from) - hat).symmetric_eigen();
-            // a block that the fit can follow completely contains no information on the noise
+            // the floor limits the correction of blocks that the regression reproduces almost completely
             let root = turn.eigenvalues.map(|e| e.max(0.04).sqrt().recip());
             let part = turn.eigenvectors.tr_mul(&left.rows(from, to - from));
             let part = &turn.eigenvectors * part.component_mul(&root);
@@ -147,7 +147,7 @@ impl Fit {
     }
 }
 
-/// The residual before whitening, one list a run.
+/// The residual before whitening, one list for each run of adjacent windows.
 fn raw_residual(cell: &Cell, rich: &[Placed], last: usize, fit: &Fit) -> Vec<Vec<f64>> {
     let mut left = vec![0.0; cell.windows.iter().max().map_or(0, |w| w + 1)];
     for (place, column) in &rich[cell.flight] {

@@ -1,4 +1,4 @@
-//! Regressor columns of the constants of each flight: misalignment angles and trims.
+//! Regressors (columns) of the constants of each flight: misalignment angles and trims.
 
 use crate::diagnose::regression::columns::Ready;
 use crate::diagnose::regression::gather::{Column, gather, rates};
@@ -9,7 +9,7 @@ use crate::weak_form::windows::{inertia, to_force_axes};
 use greylag_model::GreyBox;
 use greylag_physics::rigid_body::Vector;
 
-/// Columns of `flight` under `model`, in the order of [`PerFlight::constants`].
+/// Regressors of the constants `asked` for `flight` under `model`, in the order of [`PerFlight::constants`].
 pub fn columns(asked: &PerFlight, model: &GreyBox, flight: &Ready) -> Vec<Column> {
     let mut columns = Vec::new();
     if asked.askew_deg.is_some() {
@@ -21,7 +21,7 @@ pub fn columns(asked: &PerFlight, model: &GreyBox, flight: &Ready) -> Vec<Column
     columns
 }
 
-/// Columns of the trims. Forces and moments are linear in the trims.
+/// Regressors of the trims. Forces and moments are linear in the trims.
 fn of_trims(model: &GreyBox, flight: &Ready) -> Vec<Column> {
     let count = model.coefficients().len();
     match trims::joined(model) {
@@ -30,7 +30,7 @@ fn of_trims(model: &GreyBox, flight: &Ready) -> Vec<Column> {
     }
 }
 
-/// Columns of the misalignment angles of gyros, accelerometers and path. All quantities measured in these axes rotate,
+/// Regressors of the misalignment angles of the measured axes. All quantities that are measured in these axes rotate,
 /// including the angular acceleration.
 fn of_axes(model: &GreyBox, flight: &Ready) -> Vec<Column> {
     let angles = askew::NAMES.len();

@@ -1,4 +1,5 @@
-//! Candidate columns with the model's own coefficients and the sensor errors projected out, block by block.
+//! Regression on the candidates' columns after the nuisance parameters are projected out (Frisch–Waugh–Lovell), block
+//! by block.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -7,14 +8,14 @@ use crate::diagnose::regression::cells::{Cells, Placed};
 use crate::diagnose::regression::noise::Noise;
 use crate::diagnose::regression::whiten::Whitener;
 
-/// A nuisance parameter: a coefficient of the model, or a sensor error.
+/// A nuisance parameter: a coefficient of the model, a constant of a flight, or a sensor error.
 #[derive(Clone, Debug)]
 pub struct Known {
     /// Name of the parameter.
     pub name: String,
-    /// Prior standard deviation; infinite for the linear coefficients of an asserted effect.
+    /// Prior standard deviation; infinite for the linear coefficients of an added effect.
     pub width: f64,
-    /// Prior mean less the value at which the model was linearised.
+    /// Prior mean minus the value at which the model was linearised.
     pub offset: f64,
 }
 
@@ -24,36 +25,38 @@ impl Known {
     }
 }
 
-/// Gram matrices of all candidate columns, the residual being the last one.
+/// Gram matrices of the projected candidate columns. The last column is the projected residual.
 pub struct Projected {
     /// Gram matrix of each block.
     pub blocks: Vec<DMatrix<f64>>,
     /// Gram matrix of the prior's pseudo-observations.
     pub prior: DMatrix<f64>,
-    /// Sum of all these matrices.
+    /// Sum of `prior` and of the Gram matrices of all blocks.
     pub total: DMatrix<f64>,
-    /// Products of the candidate columns with the noise of each block.
+    /// Products of the candidate columns with the noise, by block.
     pub noise: Vec<DVector<f64>>,
-    /// Square root of `prior` for the candidates. Its product with a vector of standard normal numbers is a draw of the
-    /// prior's error.
+    /// Square root of `prior` for the candidates. Its product with standard normal random numbers is a random draw of
+    /// the prior's contribution to the products of the candidates with the residual.
     pub prior_root: DMatrix<f64>,
-    /// Nuisance parameters fitted without any candidate, relative to the point of linearisation.
+    /// Estimates of the nuisance parameters without any candidate, relative to the point of linearisation.
     pub tuned: DVector<f64>,
-    /// Change of the nuisance parameters for a unit of each candidate column.
+    /// Regression coefficients of each column on the nuisance parameters. One unit of a candidate lowers the estimates
+    /// of the nuisance parameters by its column of this matrix.
     pub taken: DMatrix<f64>,
     /// Covariance of the nuisance parameters without any candidate.
     pub covariance: DMatrix<f64>,
-    /// Squared residual and number of rows, by block and channel.
+    /// Sum of squares of the residual, and number of rows, by block and channel.
     pub by_channel: Vec<[(f64, usize); 6]>,
-    /// Projected rows of each cell.
+    /// Projected columns of the candidates and the residual, by cell.
     pub rows: Vec<DMatrix<f64>>,
 }
 
 impl Projected {
-    /// Projects the columns of `placed`, which has a list for each flight: the nuisance parameters from index 0, then
-    /// the candidates, then the residual at index `last`. `shared` holds, by index, the parts of the columns' products
-    /// with the residual that are due to shared noise; missing entries are zero. `None` if the nuisance parameters
-    /// cannot be estimated.
+    /// Projects the nuisance parameters out of the columns `placed`, which holds a list for each flight. The columns of
+    /// the nuisance parameters have the indices from 0, followed by the candidates. The residual has the index `last`.
+    ///
+    /// `shared` holds, by index, the bias of the columns' products with the residual due to common noise; missing
+    /// entries are zero. `None` if the nuisance parameters cannot be estimated.
     pub fn new(
         cells: &Cells,
         placed: &[Placed],
@@ -125,8 +128,8 @@ impl Projected {
         self.total.ncols() - 1
     }
 
-    /// Gram matrix of other columns with the candidates' indices, less their part along the nuisance parameters.
-    /// `whiteners` holds a whitener for each channel.
+    /// Gram matrix of other columns after the same projection. `placed` holds these columns by flight, with the indices
+    /// of the candidates. `whiteners` holds a whitener for each channel.
     pub fn others(&self, cells: &Cells, placed: &[Placed], whiteners: &[Whitener]) -> DMatrix<f64> {
         let (na, ny) = (self.taken.nrows(), self.taken.ncols());
         let mut gram = DMatrix::zeros(ny, ny);
@@ -138,13 +141,13 @@ impl Projected {
         gram
     }
 
-    /// Gram matrices of the data as measured.
+    /// Gram matrices over all blocks, each used once.
     pub fn grams(&self) -> Grams<'_> {
         let blocks = self.blocks.iter().collect();
         Grams { blocks, prior: &self.prior, total: self.total.clone() }
     }
 
-    /// Gram matrices of a resample: `blocks` may omit some and repeat others.
+    /// Gram matrices of a bootstrap sample with the blocks `blocks`. A block may occur several times or not at all.
     pub fn resampled(&self, blocks: impl Iterator<Item = usize>) -> Grams<'_> {
         let blocks: Vec<&DMatrix<f64>> = blocks.map(|b| &self.blocks[b]).collect();
         let mut total = self.prior.clone();
@@ -159,11 +162,11 @@ pub struct Grams<'a> {
     pub blocks: Vec<&'a DMatrix<f64>>,
     /// Gram matrix of the prior's pseudo-observations.
     pub prior: &'a DMatrix<f64>,
-    /// Sum of all these matrices.
+    /// Sum of `prior` and of the Gram matrices of the selected blocks.
     pub total: DMatrix<f64>,
 }
 
-/// Inverse of a symmetric matrix whose rows may differ widely in size.
+/// Inverse of a symmetric matrix whose rows may differ widely in size. `None` if the matrix is not positive definite.
 pub fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = matrix.diagonal().map(|d| d.max(f64::MIN_POSITIVE).sqrt().recip());
     let n = matrix.nrows();
@@ -175,7 +178,8 @@ pub fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }
 
-/// Rows whose squares are the prior's weight of the nuisance parameters; the residual is the last column.
+/// Square root of the Gram matrix of the prior's pseudo-observations: one row for each nuisance parameter, one column
+/// for each candidate, and the residual as the last column.
 fn root_of_prior(known: &[Known], taken: &DMatrix<f64>) -> DMatrix<f64> {
     let mut root = -taken.clone();
     let last = root.ncols() - 1;
@@ -186,8 +190,8 @@ fn root_of_prior(known: &[Known], taken: &DMatrix<f64>) -> DMatrix<f64> {
     root
 }
 
-/// Products of the whitened columns of the `na` nuisance parameters with one another, and with the `ny` columns
-/// behind them.
+/// Products of the whitened columns of the `na` nuisance parameters with one another, and with the `ny` columns of
+/// candidates and residual.
 fn products_of_known(
     whitened: &[(Vec<usize>, DMatrix<f64>)],
     na: usize,
@@ -211,7 +215,7 @@ fn products_of_known(
     (aa, ay)
 }
 
-/// Rows of the candidates and the residual less their part along the nuisance parameters.
+/// Columns of the candidates and the residual in one cell, minus the part that the nuisance parameters explain.
 fn project(
     places: &[usize],
     z: &DMatrix<f64>,
@@ -262,7 +266,7 @@ fn by_channel(cells: &Cells, rows: &[DMatrix<f64>], ny: usize) -> Vec<[(f64, usi
     sums
 }
 
-/// Products of the candidate columns with the residual of the rich fit.
+/// Products of the candidate columns with the noise `residuals`, by block.
 fn noise_products(
     cells: &Cells,
     rows: &[DMatrix<f64>],

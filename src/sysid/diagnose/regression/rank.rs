@@ -1,4 +1,5 @@
-//! Evidence for each candidate: the smaller of the penalised gain in likelihood and the block-robust Wald statistic.
+//! Evidence for each candidate: the smaller of the penalised likelihood gain (as in the BIC) and the block-robust Wald
+//! statistic.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,10 +10,11 @@ use crate::diagnose::regression::projected::{Grams, scaled_inverse};
 pub struct Point {
     /// Values of all coefficients of the candidate.
     pub values: Vec<f64>,
-    /// Index of the column of the contribution at this point; `None` for a linear candidate, whose contribution is zero.
+    /// Index of the column that holds the contribution at this point. `None` for a linear candidate, which is
+    /// linearised at zero contribution.
     pub contribution: Option<usize>,
-    /// Free coefficients: index in `values`, index of the derivative's column, and the range of values in which the linearisation
-    /// is used.
+    /// Free coefficients: index in `values`, index of the column with the derivative, and range of values in which the
+    /// linearisation is used.
     pub free: Vec<(usize, usize, [f64; 2])>,
 }
 
@@ -23,7 +25,7 @@ pub struct Trial {
     pub id: &'static str,
     /// Points of linearisation; a linear candidate has a single point.
     pub points: Vec<Point>,
-    /// Number of independent rows n in the channels in which the effect acts.
+    /// Number of independent rows n of the regression in the channels in which the effect acts.
     pub support: f64,
     /// Channels in which the effect acts: D, L, Y, l, m, n.
     pub channels: [bool; 6],
@@ -32,31 +34,30 @@ pub struct Trial {
 /// Score of a candidate.
 #[derive(Clone, Debug)]
 pub struct Score {
-    /// Evidence: the smaller of `fall` less d ln n and `wald`, for d free coefficients and n independent rows.
+    /// Evidence: the smaller of `fall` − d ln n and `wald`, for d free coefficients and n independent rows.
     pub evidence: f64,
     /// Block-robust Wald statistic of the free coefficients.
     pub wald: f64,
-    /// Ranking criterion: the geometric mean of penalised gain and Wald statistic, or the evidence if the evidence is not
-    /// positive. Far above the chance level, a ranking by evidence would depend on how evenly an effect is spread over the
-    /// blocks.
+    /// Ranking criterion: the geometric mean of penalised gain and Wald statistic, or the evidence if this is not
+    /// positive. Among strong effects, a ranking by evidence would favour those that are evenly spread over the blocks.
     pub order: f64,
-    /// Reduction of the squared whitened error.
+    /// Reduction of the whitened residual sum of squares.
     pub fall: f64,
-    /// Values of all coefficients.
+    /// Estimated values of all coefficients of the effect.
     pub values: Vec<f64>,
     /// Standard deviations of the free coefficients; zero for the other coefficients.
     pub deviations: Vec<f64>,
-    /// Weights of the candidate columns in the fitted contribution.
+    /// Indices and weights of the columns in the fitted contribution.
     pub weights: Vec<(usize, f64)>,
-    /// Index of the point of linearisation.
+    /// Index of the point of linearisation among the candidate's points.
     pub point: usize,
 }
 
-/// Products of the candidate columns with a residual: total, and by block.
+/// Products of the candidate columns with a residual, measured or drawn at random.
 pub struct Draw {
-    /// Products over all blocks and the prior.
+    /// Products summed over all blocks and the prior's pseudo-observations.
     pub total: DVector<f64>,
-    /// Products over each block.
+    /// Products within each block.
     pub blocks: Vec<DVector<f64>>,
 }
 
@@ -70,7 +71,8 @@ impl Draw {
 }
 
 impl Trial {
-    /// The score with the largest reduction of the error over the trial's points, for the residual of `draw`.
+    /// Score of the candidate for the residual of `draw`. It is computed at the point of linearisation with the largest
+    /// reduction of the residual sum of squares. `None` if no point can be used.
     pub fn score(&self, p: &Grams, draw: &Draw) -> Option<Score> {
         let scores = (0..self.points.len()).filter_map(|k| self.score_at(p, draw, k));
         scores.max_by(|a, b| a.fall.total_cmp(&b.fall))
@@ -118,8 +120,8 @@ impl Trial {
         })
     }
 
-    /// `step` limited to the range of the linearisation, one coefficient after the other. Also returns whether a coefficient was
-    /// limited.
+    /// Limits `step` to the range of the linearisation, one coefficient after the other. Also returns whether a
+    /// coefficient was limited.
     fn within(
         &self,
         point: &Point,
@@ -160,13 +162,13 @@ impl Trial {
     }
 }
 
-/// Products x'b and x'Sx for the contribution x that `weights` define.
+/// Products x'b and x'Sx, where `weights` holds the entries of x, `product` is b and `gram` is S.
 fn along(weights: &[(usize, f64)], gram: &DMatrix<f64>, product: &DVector<f64>) -> (f64, f64) {
     let linear = weights.iter().map(|(c, w)| w * product[*c]).sum();
     (linear, quadratic(weights, weights, gram))
 }
 
-/// Bilinear form u'Sv.
+/// Bilinear form u'Sv, where `gram` is S. The vectors u and v are given by indices and entries.
 pub fn quadratic(u: &[(usize, f64)], v: &[(usize, f64)], gram: &DMatrix<f64>) -> f64 {
     u.iter().map(|(i, a)| v.iter().map(|(j, b)| a * b * gram[(*i, *j)]).sum::<f64>()).sum()
 }
@@ -179,7 +181,8 @@ fn pick(vector: &DVector<f64>, columns: &[usize]) -> DVector<f64> {
     DVector::from_iterator(columns.len(), columns.iter().map(|c| vector[*c]))
 }
 
-/// Wald statistic θ' V⁻¹ θ with the covariance V from the scatter of the blocks, and the standard deviations.
+/// Wald statistic θ' V⁻¹ θ of the coefficients `theta`, and their standard deviations. The scatter of the blocks
+/// determines the covariance V.
 fn joint_wald(
     p: &Grams,
     draw: &Draw,
@@ -198,14 +201,14 @@ fn joint_wald(
         meat += correction * &score * score.transpose();
     }
     let covariance = inverse * meat * inverse;
-    // by chance, the scatter of the blocks may be smaller than the noise allows
+    // the scatter of the blocks may be smaller by chance than the noise allows
     let deviations =
         (0..columns.len()).map(|k| covariance[(k, k)].max(inverse[(k, k)]).sqrt()).collect();
     let wald = scaled_inverse(&covariance).map_or(0.0, |v| theta.dot(&(v * theta)));
     (wald, deviations)
 }
 
-/// Wald statistic of the amplitude of the contribution with fixed `weights`; zero if the amplitude is not positive.
+/// Wald statistic for the amplitude of a contribution with fixed `weights`. Zero if the amplitude is not positive.
 fn ray_wald(p: &Grams, draw: &Draw, weights: &[(usize, f64)], linear: f64, square: f64) -> f64 {
     if square <= 0.0 {
         return 0.0;
@@ -221,8 +224,8 @@ fn ray_wald(p: &Grams, draw: &Draw, weights: &[(usize, f64)], linear: f64, squar
     if amount > 0.0 && meat > 0.0 { linear * linear / meat } else { 0.0 }
 }
 
-/// Standard deviations of the first coefficient in a joint fit of `columns`: from the noise alone, and from the scatter of the
-/// blocks of `null`.
+/// Standard deviations of the first coefficient in a joint fit of `columns`. The first is due to white noise, the
+/// second is computed from the scatter of the blocks of `null`, a draw of pure noise.
 pub fn deviations(p: &Grams, null: &Draw, columns: &[usize]) -> Option<(f64, f64)> {
     let inverse = scaled_inverse(&select(&p.total, columns))?;
     let zero = DVector::zeros(columns.len());

@@ -24,26 +24,28 @@ pub const NAMES: [&str; SENSORS] = [
     "blur_actuators",
 ];
 
-/// Name of the actuators' delay.
+/// Name of the delay of the actuator record.
 pub const LATE: &str = "skew_actuators";
-/// Index of the actuators' delay in [`NAMES`].
+/// Index of the delay of the actuator record in [`NAMES`].
 pub const LATE_PLACE: usize = SENSORS - 2;
-/// Index of the actuators' blur.
+/// Index of the averaging ("blur") of the actuator record in [`NAMES`].
 pub const BLUR_PLACE: usize = SENSORS - 1;
 
-/// Smallest standard deviations (rad/s, rad, relative, m/s², s). The covariance of the reconstruction covers only modelled
-/// errors.
+/// Smallest prior standard deviations (rad/s, rad, relative, m/s², s), in the order of [`NAMES`]. Smaller values of the
+/// reconstruction are not used, because they cover only modelled errors.
 const FLOOR: [f64; SENSORS - 3] =
     [2e-4, 2e-4, 2e-4, 1e-3, 1e-3, 3e-3, 0.01, 0.01, 0.01, 5e-4, 5e-4, 2e-3, 5e-4];
 /// Prior standard deviation of the delay of angular accelerations relative to the moments, s. The delay is 1.25 ms in a
 /// simulator with explicit Euler steps at 400 Hz, and 1.6 ms with a gyro's low-pass filter of 100 Hz.
 const MOMENTS_LATE: f64 = 1.5e-3;
-/// Prior standard deviation of this delay if the log holds the steps of a simulator, s.
+/// Prior standard deviation of the same delay if the log holds the steps of a simulator, s.
 const MOMENTS_ON_TIME: f64 = 1e-6;
-/// Prior standard deviation of the actuators' delay, in sampling intervals: the 95 % interval is ±1.5 sampling intervals.
+/// Prior standard deviation of the delay of the actuator record, in sampling intervals. The 95 % interval is ±1.5
+/// sampling intervals.
 const SKEW_SAMPLES: f64 = 0.77;
-/// Prior mean and standard deviation of the actuators' blur, in squared sampling intervals. A record that is late by a
-/// fraction of a sample lies between a sample and the mean of two adjacent samples, whose blur is 1/8.
+/// Prior mean and standard deviation of the averaging of the actuator record, in squared sampling intervals. A record
+/// that is late by a fraction of the interval lies between a single sample (averaging 0) and the mean of two adjacent
+/// samples (averaging 1/8).
 pub const BLURRED: [f64; 2] = [1.0 / 16.0, 1.0 / 24.0];
 
 /// Prior mean of the sensor error with the index `which`, in its unit.

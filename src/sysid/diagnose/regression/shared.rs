@@ -1,8 +1,8 @@
-//! Noise that columns and residual share, and the spurious evidence that it causes.
+//! Errors-in-variables bias: spurious evidence due to noise that regressors and residual have in common.
 //!
-//! Gyro noise and the error of the path are contained in the residual and in the columns. The mean of their product is
-//! therefore not zero. This bias is estimated with additional simulated noise of the same distribution: the products of the
-//! resulting changes of columns and residual have the same mean.
+//! Gyro noise and the error of the path are contained in the residual and in the regressors. The mean of their product
+//! is therefore not zero. This bias is estimated with additional simulated noise of the same distribution: the products
+//! of the resulting changes of regressors and residual have the same mean.
 
 use rand_distr::{Distribution, StandardNormal};
 
@@ -16,14 +16,14 @@ use greylag_num::stream::stream;
 /// Number of the random stream for the simulated noise.
 const DISTURBANCE: u64 = 85;
 
-/// Errors of the path's V, α and β: standard deviation of the sensor noise (m/s, rad, rad), and the factor by which the
-/// smoother's weight decreases from one sample to the next.
+/// Errors of V, α and β on the reconstructed path, by quantity: standard deviation of the sensor noise (m/s, rad, rad),
+/// and factor by which the smoother's weight decreases from one sample to the next.
 pub type PathError = [[f64; 2]; 3];
 
-/// Path errors of a flight with the sampling interval `dt` (s), for a steady-state smoother.
+/// Computes the path errors of a flight with the sampling interval `dt` (s), for a steady-state smoother.
 ///
-/// The smoother combines the measured value with the integrated rates. With the variances R of the measurement and q of an
-/// integration step, its memory is √(R/q) samples to either side.
+/// The smoother combines the measured value with the integrated rates. Let R be the variance of the measurement and q
+/// the variance of an integration step. The smoother's memory is then √(R/q) samples to either side.
 pub fn path_error(flight: &Reconstruction, dt: f64) -> PathError {
     let [fx, fy, fz] = flight.force_noise.map(|x| if x.is_finite() { x } else { 0.0 });
     let [_, _, v, p, q, r, alpha, beta] = flight.noise.map(|x| if x.is_finite() { x } else { 0.0 });
@@ -40,14 +40,14 @@ pub fn path_error(flight: &Reconstruction, dt: f64) -> PathError {
     [of(v, fx), of(alpha, (fz / speed).hypot(q)), of(beta, (fy / speed).hypot(r).hypot(0.1 * p))]
 }
 
-/// `flight` with additional simulated noise of inertial sensors, vanes and airspeed. The noise of the path is filtered like in
-/// the smoother. `which` holds the index of the flight and the number of the draw.
+/// Returns `flight` with additional simulated noise of inertial sensors, vanes and airspeed. The noise of the path is
+/// filtered as in the smoother. `which` holds the index of the flight and the number of the draw.
 pub fn disturbed(flight: &Prepared, path: &PathError, seed: u64, which: [usize; 2]) -> Prepared {
     let mut random = stream(seed, &[DISTURBANCE, which[0] as u64, which[1] as u64]);
     let mut unit = || -> f64 { StandardNormal.sample(&mut random) };
     let mut out = flight.clone();
     for segment in &mut out.segments {
-        // V, α, β: error of the integrated rates, and error of the measurement less error of the integrated rates
+        // for V, α, β: error of the integrated rates, and error of the measurement minus error of the integrated rates
         let mut drift: [Vec<f64>; 3] = Default::default();
         let mut measured: [Vec<f64>; 3] = Default::default();
         let mut sum = [0.0; 3];
@@ -82,8 +82,8 @@ pub fn disturbed(flight: &Prepared, path: &PathError, seed: u64, which: [usize; 
     out
 }
 
-/// First-order low-pass filters forward and backward with the pole `kept`. Each starts from the mean of the first samples
-/// within its memory.
+/// Filters `x` forward and backward with first-order low-pass filters with the pole `kept`. Each filter starts from the
+/// mean of the first samples within its memory.
 fn both_ways(x: &[f64], kept: f64) -> Vec<f64> {
     let pass = |x: &mut dyn Iterator<Item = f64>, start: f64| {
         let mut y = start;
@@ -102,10 +102,10 @@ fn both_ways(x: &[f64], kept: f64) -> Vec<f64> {
     back
 }
 
-/// Products of the changes of columns and residual due to simulated noise, by flight.
+/// Products of the changes of columns and residual due to simulated noise, by flight and index of the column.
 ///
-/// The residual has the index `last`, the columns have smaller indices. An index means the same column in `before` and
-/// `after`.
+/// `before` holds the columns without and `after` the columns with simulated noise. The residual has the index `last`,
+/// all other columns have smaller indices.
 pub fn products(
     cells: &Cells,
     before: &[Placed],
@@ -131,7 +131,7 @@ pub fn products(
     sums
 }
 
-/// `after` less `before` for each index. A channel that is missing in one of them stays empty.
+/// Columns of `after` minus the columns of `before` with the same index. A channel that is empty in either stays empty.
 fn differences(before: &Placed, after: &Placed) -> Placed {
     let of = |(place, new): &(usize, Column)| {
         let (_, old) = before.iter().find(|(p, _)| p == place)?;

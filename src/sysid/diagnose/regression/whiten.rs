@@ -1,14 +1,14 @@
 //! Autoregressive whitening of a channel.
 
-/// Share of the variance that is treated as white. No frequency then counts as free of noise.
+/// Share of white noise that is added to the variance. No frequency then counts as free of noise.
 const FLOOR: f64 = 1e-3;
 
-/// Linear predictors of a value from the previous values, of each order up to the largest.
+/// Linear predictors of a value from the previous values, one for each order up to the largest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Whitener {
     /// `predictors[k]` holds the weights of the k previous values, the most recent first.
     predictors: Vec<Vec<f64>>,
-    /// Standard deviation of each predictor's residual.
+    /// Standard deviation of each predictor's prediction error.
     deviations: Vec<f64>,
 }
 
@@ -39,7 +39,7 @@ impl Whitener {
         fitted
     }
 
-    /// Prediction residuals of `run`, in standard deviations.
+    /// Prediction errors of `run`, in standard deviations. The first values are predicted with lower orders.
     pub fn apply(&self, run: &[f64]) -> Vec<f64> {
         let order = self.predictors.len() - 1;
         (0..run.len())
@@ -51,14 +51,15 @@ impl Whitener {
             .collect()
     }
 
-    /// The whitener for noise with standard deviations multiplied by `factor`.
+    /// Adapts the whitener to noise whose standard deviation is larger by `factor`.
     pub fn scaled(mut self, factor: f64) -> Whitener {
         self.deviations.iter_mut().for_each(|d| *d *= factor);
         self
     }
 }
 
-/// Sum of x(k) x(k + lag) divided by the number of all values. This divisor keeps the sequence positive definite.
+/// Sum of x(k) x(k + lag) divided by the number of all values. The divisor is the same for every lag, which keeps the
+/// autocovariance sequence positive definite.
 fn autocovariance(runs: &[Vec<f64>], lag: usize) -> f64 {
     let count: usize = runs.iter().map(Vec::len).sum();
     let of = |run: &Vec<f64>| run.iter().zip(run.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>();

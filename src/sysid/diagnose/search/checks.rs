@@ -1,6 +1,7 @@
-//! Checks of an effect in addition to its evidence: held-out segments, bootstraps, agreement of the flights.
+//! Checks of an effect in addition to its evidence: error on held-out blocks, stability over bootstraps, consistency
+//! between flights.
 //!
-//! The thresholds of the checks are in `stepwise/examine.rs` and `stepwise/judge.rs`.
+//! The limits of the checks are in `stepwise/examine.rs` and `stepwise/judge.rs`.
 
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
@@ -14,32 +15,37 @@ use crate::diagnose::regression::rank::{Draw, Point, Score, Trial, quadratic};
 use crate::diagnose::search::round::Round;
 use greylag_num::stream::stream;
 
-/// Number of folds of the held-out segments.
+/// Number of folds of the cross-validation over blocks.
 const FOLDS: usize = 5;
 /// Number of the random stream for the bootstraps.
 const BOOTSTRAPS: u64 = 82;
-/// Magnitude of the correlation above which contributions cannot be distinguished.
+/// Two effects may be indistinguishable if the correlation of their contributions exceeds this magnitude.
 pub const ALIKE: f64 = 0.9;
-/// Difference of evidence below which effects cannot be distinguished.
+/// Two effects may be indistinguishable if their evidence differs by less than this value.
 pub const CLOSE: f64 = 10.0;
-/// Uncertainty of the noise level, as squared whitened error per row. Without a missing effect, the error beyond noise was
-/// −0.03 to 0.07.
+/// Uncertainty of the noise variance, relative to this variance. Without a missing effect, the mean square of the
+/// whitened residual differed from 1 by −0.03 to 0.07.
 const UNSURE: f64 = 0.1;
-/// Number of standard deviations of the squared noise above which a remaining residual is significant.
+/// A residual sum of squares is significant if it exceeds its expectation for noise by this number of standard
+/// deviations.
 const DOUBT: f64 = 4.0;
-/// Smallest share of a flight's information on a coefficient that is due to excitation, not to noise in the columns.
+/// Smallest share of a flight's information on a coefficient that must come from excitation and not from noise in the
+/// regressors. With a smaller share, the flight yields no estimate.
 const LEAST_SIGNAL: f64 = 0.5;
-/// Reduction of the prior's misfit, in prior standard deviations, above which a candidate may only replace an adjustment of
-/// existing coefficients.
+/// First condition for a candidate that merely replaces changes of existing coefficients. It reduces the sum of their
+/// squared deviations from the prior, in prior standard deviations, by more than the square of this number.
 const PRIOR_MISFIT: f64 = 5.0;
-/// Share of prior misfit in a candidate's reduction above which the candidate counts as such a replacement.
+/// Second condition for such a candidate. The same reduction is more than this share of the candidate's reduction of
+/// the whole cost, which also contains the residual.
 const PRIOR_SHARE: f64 = 0.9;
-/// Number of candidates that are compared in a bootstrap.
+/// Number of candidates, the best first, that compete in a bootstrap.
 const COMPETING: usize = 8;
 
-/// Share of the squared error beyond noise that the candidate removes from held-out blocks, in the channels in which it acts.
+/// Share of the residual beyond noise that the candidate removes from held-out blocks, in the channels in which it
+/// acts. The residual beyond noise is the whitened residual sum of squares minus its expectation for pure noise.
 ///
-/// Every fifth block is held out in turn. The coefficients are fitted to the other blocks. NaN if this fit is singular.
+/// Every fifth block is held out in turn. The candidate's coefficients are fitted to the other blocks. NaN if this fit
+/// is singular.
 pub fn heldout_reduction(round: &Round, trial: &Trial, score: &Score) -> f64 {
     let p = &round.projected;
     let last = p.width();
@@ -71,7 +77,7 @@ pub fn heldout_reduction(round: &Round, trial: &Trial, score: &Score) -> f64 {
     taken / excess(round, &trial.channels).max(taken).max(1.0)
 }
 
-/// Squared whitened error of a model beyond noise, by channel.
+/// Residual beyond noise by channel: the whitened residual sum of squares minus its expectation for pure noise.
 #[derive(Clone, Debug)]
 pub struct Beyond {
     excess: [f64; 6],
@@ -79,8 +85,8 @@ pub struct Beyond {
 }
 
 impl Beyond {
-    /// The error of the model of `round`. The round must have no candidates: a fit with the columns of all candidates follows
-    /// the noise, of which as little as half may remain in the moments.
+    /// Computes the residual beyond noise of the model of `round`. The round must have no candidates. Otherwise the
+    /// noise would be estimated after a fit of all candidates, which may remove up to half of the noise of the moments.
     pub fn of(round: &Round) -> Beyond {
         let only = |c: usize| std::array::from_fn(|k| k == c);
         Beyond {
@@ -89,18 +95,18 @@ impl Beyond {
         }
     }
 
-    /// Remaining share of the error in `channels` after an effect has removed `fall`. `None` if the remaining error does not
-    /// exceed chance.
+    /// Returns the share of the residual beyond noise in `channels` that remains after an effect has reduced the
+    /// residual sum of squares by `fall`. `None` if the remaining residual is not significant.
     pub fn share(&self, channels: &[usize], fall: f64) -> Option<f64> {
         let own = |of: &[f64; 6]| channels.iter().map(|c| of[*c]).sum::<f64>();
         let (left, rows) = (own(&self.excess), own(&self.rows));
-        // the sum of n squares of white noise has the standard deviation √(2n)
+        // the sum of squares of n values of unit white noise has the standard deviation √(2n)
         let beyond_doubt = left > f64::max(DOUBT * (2.0 * rows).sqrt(), UNSURE * rows);
         beyond_doubt.then(|| left / (left + fall))
     }
 }
 
-/// Squared whitened error beyond noise in `channels`.
+/// Residual beyond noise in `channels`: the whitened residual sum of squares minus its expectation for pure noise.
 pub fn excess(round: &Round, channels: &[bool; 6]) -> f64 {
     let blocks = round.projected.by_channel.iter();
     let of = |sums: &[(f64, usize); 6]| -> f64 {
@@ -109,14 +115,14 @@ pub fn excess(round: &Round, channels: &[bool; 6]) -> f64 {
     blocks.map(of).sum::<f64>() - rows(round, channels)
 }
 
-/// Number of rows in `channels`.
+/// Number of rows of the regression in `channels`. It equals the expected sum of squares of the whitened noise.
 fn rows(round: &Round, channels: &[bool; 6]) -> f64 {
     let all = round.projected.rows_by_channel();
     (0..6).filter(|c| channels[*c]).map(|c| all[c]).sum()
 }
 
-/// Directions that are scaled in a contribution: each column of a linear candidate, or the whole contribution of a nonlinear
-/// candidate.
+/// Combinations of columns whose amplitudes the held-out check fits: each column of a linear candidate, or the whole
+/// contribution of a nonlinear candidate. An entry is the index of a column with its weight.
 fn directions(trial: &Trial, score: &Score) -> Vec<Vec<(usize, f64)>> {
     match trial.points[score.point].contribution {
         None => score.weights.iter().map(|(c, _)| vec![(*c, 1.0)]).collect(),
@@ -124,10 +130,10 @@ fn directions(trial: &Trial, score: &Score) -> Vec<Vec<(usize, f64)>> {
     }
 }
 
-/// Whether the candidate mostly replaces an adjustment of existing coefficients.
+/// Whether the candidate merely replaces changes of existing coefficients.
 ///
-/// The candidate then reduces the prior misfit of coefficients that the data move far from their prior. It hardly reduces the
-/// error of the flights, because the adjusted coefficients remove the same error.
+/// Without the candidate, the data move these coefficients far from their prior and thereby explain the residual. With
+/// the candidate, the coefficients return to their prior, and the residual hardly becomes smaller.
 pub fn absorbs_prior_error(round: &Round, score: &Score) -> bool {
     let prior = &round.projected.prior;
     let last = round.projected.width();
@@ -136,7 +142,7 @@ pub fn absorbs_prior_error(round: &Round, score: &Score) -> bool {
     reduction > PRIOR_MISFIT.powi(2) && reduction > PRIOR_SHARE * score.fall
 }
 
-/// Correlation of the contributions of two scores to the residual.
+/// Correlation of the fitted contributions of two candidates after the nuisance parameters are projected out.
 pub fn correlation(round: &Round, a: &Score, b: &Score) -> f64 {
     let total = &round.projected.total;
     let of = |u: &Score, v: &Score| quadratic(&u.weights, &v.weights, total);
@@ -157,7 +163,7 @@ pub fn class(round: &Round, scores: &[(usize, Score)], of: usize) -> Vec<usize> 
         .collect()
 }
 
-/// Share of `count` block bootstraps in which a trial of `class` ranks first among the trials of `open`.
+/// Share of `count` block bootstraps in which a candidate of `class` ranks first among the candidates `open`.
 ///
 /// `open` is in descending order of rank. Blocks are drawn separately for each flight.
 pub fn selected(round: &Round, open: &[usize], class: &[usize], count: usize) -> f64 {
@@ -192,11 +198,13 @@ pub fn selected(round: &Round, open: &[usize], class: &[usize], count: usize) ->
     wins as f64 / count.max(1) as f64
 }
 
-/// Estimates from each flight alone: for each free coefficient its index among the coefficients of the effect, then by flight its
-/// estimate with its standard deviation. NaN for a flight without information.
+/// Estimates of the free coefficients of an effect from each flight alone.
 ///
-/// Sensor errors are estimated again for each flight. The model's coefficients keep the estimates and standard deviations
-/// from all flights. A flight with little excitation could not re-estimate them: noise in its regressors biases coefficients
+/// Returns one entry for each free coefficient: its index among the coefficients of the effect, then the estimate and
+/// its standard deviation for each flight. Both are NaN for a flight without information.
+///
+/// Sensor errors are estimated again for each flight. The model's coefficients have the estimates from all flights as
+/// priors. Without these priors, noise in the regressors of a flight with little excitation would bias the coefficients
 /// toward zero (errors in variables).
 pub fn by_flight(round: &Round, trial: &Trial, score: &Score) -> Vec<(usize, Vec<[f64; 2]>)> {
     let free = &trial.points[score.point].free;
@@ -210,7 +218,7 @@ pub fn by_flight(round: &Round, trial: &Trial, score: &Score) -> Vec<(usize, Vec
     free.iter().enumerate().map(|(k, f)| (f.0, of(k))).collect()
 }
 
-/// Estimates of the free coefficients from one flight, in their order.
+/// Estimates and standard deviations of the free coefficients from one flight. `None` if they cannot be computed.
 fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Option<Vec<[f64; 2]>> {
     let own: Vec<usize> =
         (0..round.cells.list.len()).filter(|k| round.cells.list[*k].flight == flight).collect();
@@ -239,14 +247,16 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     let by_itself = Trial { points: vec![point], ..trial.clone() };
     let grams = p.grams();
     let found = by_itself.score(&grams, &Draw::measured(&grams))?;
-    // a residual beyond noise, for example due to another missing effect, may bias the estimate: the deviation is raised
+    // a residual beyond noise, for example due to another missing effect, may bias the estimate: its standard deviation
+    // is increased
     let misfit = misfit(&p, &trial.channels, found.fall);
     let each: Vec<[f64; 2]> =
         indices.iter().map(|i| [found.values[*i], misfit * found.deviations[*i]]).collect();
     if contribution.is_some() {
         return Some(each);
     }
-    // sensor noise in the columns resembles excitation but contains no information: its part is subtracted
+    // noise in the regressors looks like excitation but contains no information: its part of the Gram matrix is
+    // subtracted
     let disturbed = alone(&round.disturbed, flight, na, &columns);
     let added = less(&disturbed, &placed);
     let feint = p.others(&cells, &added, &noise.whiteners);
@@ -262,7 +272,8 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     Some(each.iter().enumerate().map(one).collect())
 }
 
-/// Ratio of the residual in `channels`, after a reduction of its square by `fall`, to the noise; at least 1.
+/// Root mean square of the whitened residual in `channels` after its sum of squares has been reduced by `fall`. The
+/// result is at least 1, the value for pure noise.
 fn misfit(p: &Projected, channels: &[bool; 6], fall: f64) -> f64 {
     let own = |of: &[(f64, usize); 6]| (0..6).filter(|c| channels[*c]).map(|c| of[c]).collect();
     let all: Vec<Vec<(f64, usize)>> = p.by_channel.iter().map(own).collect();
@@ -271,14 +282,14 @@ fn misfit(p: &Projected, channels: &[bool; 6], fall: f64) -> f64 {
     ((square - fall) / rows.max(1) as f64).max(1.0).sqrt()
 }
 
-/// Nuisance parameters, with priors of the model's coefficients from their joint estimate with the effect of `score` from all
-/// flights.
+/// Nuisance parameters for the fit to one flight. The prior of each model coefficient is its estimate from all flights,
+/// fitted together with the effect of `score`.
 fn together(round: &Round, score: &Score) -> Vec<Known> {
     let p = &round.projected;
     let mut all = round.known.clone();
     for (k, known) in all.iter_mut().take(round.coefficients.len()).enumerate() {
         let given: f64 = score.weights.iter().map(|(c, w)| w * p.taken[(k, *c)]).sum();
-        // the change due to the effect has the same relative standard deviation as the effect, 1 / √wald
+        // the change that the effect causes has the relative standard deviation of the effect itself, 1 / √wald
         let astray = given.powi(2) / score.wald.max(1.0);
         known.offset = p.tuned[k] - given;
         known.width = (p.covariance[(k, k)].max(0.0) + astray).sqrt().min(known.width);
@@ -286,7 +297,8 @@ fn together(round: &Round, score: &Score) -> Vec<Known> {
     all
 }
 
-/// Nuisance columns of one flight and its renumbered candidate columns `columns`. The lists of the other flights are empty.
+/// Columns of one flight: those of the `na` nuisance parameters, then the candidate's columns `columns`, renumbered
+/// from `na`. The lists of all other flights are empty.
 fn alone(placed: &[Placed], flight: usize, na: usize, columns: &[usize]) -> Vec<Placed> {
     let own = &placed[flight];
     let mut list: Placed = own.iter().take_while(|(p, _)| *p < na).cloned().collect();
@@ -299,7 +311,7 @@ fn alone(placed: &[Placed], flight: usize, na: usize, columns: &[usize]) -> Vec<
     all
 }
 
-/// Columns of `a` less those of `b` at the same indices.
+/// Columns of `a` minus the columns of `b` with the same indices, by flight.
 fn less(a: &[Placed], b: &[Placed]) -> Vec<Placed> {
     let of = |(a, b): (&Placed, &Placed)| {
         let both = a.iter().filter_map(|(p, x)| Some((*p, x, &b.iter().find(|(q, _)| q == p)?.1)));
@@ -308,8 +320,11 @@ fn less(a: &[Placed], b: &[Placed]) -> Vec<Placed> {
     a.iter().zip(b).map(of).collect()
 }
 
-/// Whether a flight contradicts the common `value`. Its estimate then has significantly the opposite sign, or differs
-/// significantly and by more than half of `value`. `flights` holds estimates and standard deviations.
+/// Whether a flight contradicts `value`, the estimate from all flights. `flights` holds the estimate and standard
+/// deviation of each flight.
+///
+/// An estimate contradicts `value` if it has the opposite sign by more than three standard deviations. It also
+/// contradicts if it differs by more than four standard deviations and by more than half of `value`.
 pub fn contradict(value: f64, flights: &[[f64; 2]]) -> bool {
     flights.iter().any(|[own, sd]| {
         let other_sign = own * value < 0.0 && own.abs() > 3.0 * sd;

@@ -1,8 +1,8 @@
-//! Delay of the recorded actuators, estimated from forces and moments together.
+//! Delay of the actuator record, estimated from forces and moments together.
 //!
-//! A delayed surface and an early record of the surface have the same effect on the moments. The throttle is recorded with
-//! the same clock: its effect on the forces shows the clock error. Free runs, in which thrust is only an acceleration, do not
-//! distinguish both causes.
+//! In the moments, a surface that moves late looks like a record whose time stamps are too early. The throttle is
+//! recorded with the same clock, so its effect on the forces shows the clock error. Open-loop simulations (free runs)
+//! cannot distinguish the two causes, because thrust appears in them only as an acceleration.
 
 use crate::diagnose::regression::columns::SENSORS;
 use crate::diagnose::regression::sensors;
@@ -16,10 +16,11 @@ use greylag_model::GreyBox;
 
 /// Number of fits; each fit is linearised at the estimate of the previous one.
 const PASSES: usize = 4;
-/// Seed of the random draws of shared noise.
+/// Seed of the random draws for the errors-in-variables correction.
 const SEED: u64 = 1;
 
-/// Standard deviations of the sensor errors and of the path of a flight after its reconstruction.
+/// Uncertainty of a flight after its reconstruction: standard deviations of the sensor errors, and errors of airspeed,
+/// α and β.
 #[derive(Clone, Copy, Debug)]
 pub struct Doubt {
     sensors: [f64; SENSORS],
@@ -27,24 +28,25 @@ pub struct Doubt {
 }
 
 impl Doubt {
-    /// The standard deviations for `flight` at the sampling interval `dt` (s).
+    /// Computes the uncertainty of `flight` at the sampling interval `dt` (s).
     pub fn of(flight: &Reconstruction, dt: f64) -> Doubt {
         Doubt { sensors: sensors::widths(flight, dt), path: shared::path_error(flight, dt) }
     }
 }
 
-/// A model fitted to forces and moments together with the actuators' delays.
+/// Result of a fit to forces and moments in which the delays of the actuator records are free.
 pub struct Clocks {
     /// The model with its fitted coefficients.
     pub model: GreyBox,
-    /// Delay of each flight's recorded actuators, s, and its standard deviation.
+    /// Delay of the actuator record of each flight and its standard deviation, s.
     pub late: Vec<[f64; 2]>,
 }
 
-/// Fits `model` to `flights` together with their actuator delays and the constants of each flight that `per_flight` selects.
+/// Fits `model` to `flights`, together with the delay of each actuator record and the constants of each flight that
+/// `per_flight` selects.
 ///
-/// The first `given` coefficients have their prior standard deviations. The others have no prior. `None` if the model cannot
-/// be evaluated over the flights.
+/// The first `given` coefficients have their prior standard deviations. The other linear coefficients have no prior.
+/// `None` if the model cannot be evaluated over the flights.
 pub fn clocks(
     model: &GreyBox,
     given: usize,

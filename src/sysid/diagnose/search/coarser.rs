@@ -1,20 +1,22 @@
-//! Discretisation error of a fit, estimated by the same fit on every other sample.
+//! Discretisation error of the fitted coefficients, estimated by a second fit to every other sample.
 //!
-//! A confidence interval covers only noise. With a sampling interval of 20 or 40 ms, surfaces and rates change between two
-//! samples. The resulting error of a sum over samples is not noise: it is the same in every flight and its mean is not zero.
+//! The standard deviations of a fit cover only noise. At a sampling interval of 20 or 40 ms, deflections and rates
+//! change between two samples, but the fit replaces integrals by sums over samples. The resulting error is not noise:
+//! it is the same in every flight, and its mean is not zero.
 
 use crate::diagnose::search::round::{Problem, Round};
 use crate::diagnose::search::settling::SETTLING;
 use greylag_logs::Sampling;
 
-/// Standard deviation of the discretisation error with all samples, as a share of the change between half of the samples and
-/// all samples. The share is one third if the error is proportional to the square of the sampling interval.
+/// Standard deviation of the discretisation error, as a share of the difference between the fits to half of the samples
+/// and to all samples. The share is one third if the error is proportional to the square of the sampling interval.
 const LEFT: f64 = 1.0 / 3.0;
 
-/// Standard deviation of each coefficient of the model of `round` due to the discretisation, in the order and the units of
+/// Standard deviation of each coefficient of the model of `round` due to discretisation, in the order and the units of
 /// the model's coefficients.
 ///
-/// Zero if the fit on half of the samples fails, and for the steps of a simulator, whose sums are exact.
+/// Zero if the fit to half of the samples fails. Zero also if the log holds the steps of a simulator, for which the
+/// sums are exact.
 pub fn left_by_sums(problem: &Problem, round: &Round) -> Vec<f64> {
     let fine = round.tuned();
     let none = vec![0.0; fine.coefficients().len()];
@@ -58,7 +60,8 @@ mod tests {
 
     const STEP_S: f64 = 0.01;
 
-    /// 40 s of `model` with sinusoidal surfaces, sampled at every `every`-th step, without noise and specific force.
+    /// Simulates 40 s of `model` with sinusoidal deflections and records every `every`-th step, without noise and
+    /// without specific force.
     fn flown(model: &GreyBox, every: usize, sampling: Sampling) -> Reconstruction {
         let surfaces = |time: f64| Controls {
             aileron: 0.03 * (5.0 * time).sin() + 0.05 * (23.0 * time).sin(),
@@ -98,7 +101,8 @@ mod tests {
         }
     }
 
-    /// Error of the fitted roll damping, and its standard deviations due to noise and to discretisation.
+    /// Error of the fitted roll damping, its standard deviation due to noise, and its standard deviation due to
+    /// discretisation.
     fn roll_damping(every: usize, sampling: Sampling) -> [f64; 3] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
         let mut model = GreyBox::load(&path).unwrap();
@@ -119,7 +123,7 @@ mod tests {
         for _ in 0..SETTLING {
             round = Round::new(&problem, round.tuned(), &[]).unwrap();
         }
-        // a number would shift with the flights that are left out
+        // parameters are named after the flight, because its number changes if an earlier flight is left out
         assert!(round.known.iter().any(|known| known.name == "gyro_bias_p of flight f"));
         let k = round.coefficients.iter().position(|of| *of == place).unwrap();
         let noise = round.projected.covariance[(k, k)].sqrt();

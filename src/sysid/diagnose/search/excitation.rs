@@ -1,4 +1,4 @@
-//! Check whether the flights contain enough excitation for a diagnosis.
+//! Checks whether the flights contain enough excitation for a diagnosis.
 
 use crate::diagnose::error::DiagnoseError;
 use crate::flight_path::reconstruction::Instant;
@@ -8,8 +8,8 @@ use greylag_logs::rudder::MOVES_RAD;
 /// Smallest total duration of the flights, s.
 const LEAST_S: f64 = 10.0;
 
-/// A requirement: name and reader of a variable, smallest standard deviation, factor from SI to the unit of this deviation,
-/// unit, and manoeuvre that excites the variable.
+/// Requirement on the motion of a variable: its name, a function that reads it, smallest standard deviation, factor
+/// from SI to the unit of this deviation, this unit, and a manoeuvre that excites the variable.
 type Need = (&'static str, fn(&Instant) -> f64, f64, f64, &'static str, &'static str);
 
 const NEEDS: [Need; 4] = [
@@ -19,7 +19,7 @@ const NEEDS: [Need; 4] = [
     ("the angle of attack", |i| i.state.alpha, 0.4, 57.3, "°", "pull-ups and a slow flight"),
 ];
 
-/// Notes on the variables with too little excitation for a diagnosis.
+/// Returns a note for each variable that moves too little for a diagnosis.
 ///
 /// # Errors
 /// The flights are shorter than 10 s, or at least three of aileron, elevator, throttle and angle of attack hardly move.
@@ -45,7 +45,8 @@ pub fn check(flights: &[Prepared]) -> Result<Vec<String>, DiagnoseError> {
         .collect())
 }
 
-/// The variation of a variable in words. If the variable is constant, the log probably has the wrong channel.
+/// Describes the small motion of a variable in words. If the variable is constant, the log probably has the wrong
+/// channel.
 fn small(name: &str, moved: f64, unit: &str) -> String {
     match moved == 0.0 {
         true => format!(

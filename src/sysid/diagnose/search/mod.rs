@@ -1,4 +1,4 @@
-//! The stepwise search: rounds, checks of a candidate, thresholds from null flights.
+//! Forward selection of the effects that a model lacks: ranking of candidates, checks, and critical values.
 
 pub(super) mod checks;
 pub(crate) mod clocks;

@@ -1,4 +1,4 @@
-//! Chance level: evidence of the best candidate in simulated flights without a missing effect (null flights).
+//! Critical value of the evidence, from bootstrap draws under the null hypothesis that no effect is missing.
 
 use nalgebra::DVector;
 use rand::RngExt;
@@ -9,11 +9,12 @@ use crate::diagnose::regression::projected::Projected;
 use crate::diagnose::regression::rank::{Draw, Trial};
 use greylag_num::stream::stream;
 
-/// Number of the random stream for the null flights.
+/// Number of the random stream for the bootstrap draws.
 const NULLS: u64 = 80;
 
-/// Null flight `k`: the noise of each block with a random sign, and random errors with the prior's standard deviations. All
-/// channels of a block have the same sign.
+/// Draw number `k` under the null hypothesis (wild block bootstrap): products of the candidates' regressors with pure
+/// noise. The noise of each block has a random sign that is common to all channels. Random errors of the prior means
+/// are added.
 pub fn draw(p: &Projected, seed: u64, k: usize) -> Draw {
     let mut random = stream(seed, &[NULLS, k as u64]);
     let mut total = DVector::zeros(p.width());
@@ -32,7 +33,7 @@ pub fn draw(p: &Projected, seed: u64, k: usize) -> Draw {
     Draw { total, blocks }
 }
 
-/// The best evidence in each of `count` null flights, ascending.
+/// Evidence of the best candidate in each of `count` draws under the null hypothesis, in ascending order.
 pub fn best(p: &Projected, trials: &[Trial], seed: u64, count: usize) -> Vec<f64> {
     let grams = p.grams();
     let mut best: Vec<f64> = (0..count)

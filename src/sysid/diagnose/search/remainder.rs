@@ -1,4 +1,4 @@
-//! Error that a flexible model without physics could remove, cross-validated by flight.
+//! Part of the residual that a flexible model without physics could remove, cross-validated by flight.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rand::RngExt;
@@ -9,27 +9,28 @@ use crate::diagnose::search::nulls::threshold;
 use crate::diagnose::search::round::Round;
 use greylag_num::stream::stream;
 
-/// Ridge parameters tried, as shares of a feature's mean square.
+/// Ridge parameters that are tried, relative to the mean squared norm of a feature.
 const RIDGES: [f64; 4] = [1e-3, 1e-2, 1e-1, 1.0];
 /// Number of the random stream for the draws of noise.
 const NULLS: u64 = 83;
 /// Number of folds into which a single flight is divided. With several flights, each flight is a fold.
 const FOLDS: usize = 3;
 
-/// Removable error, by channel and in total.
+/// Reduction of the residual by the flexible model, by channel and in total.
 #[derive(Clone, Debug)]
 pub struct Remainder {
-    /// Reduction of the squared whitened error on flights to which the flexible model was not fitted.
+    /// Reduction of the whitened residual sum of squares on flights to which the flexible model was not fitted, by
+    /// channel.
     pub removable: [f64; 6],
-    /// Reduction that chance reaches, by channel.
+    /// Critical value of the reduction for pure noise, by channel.
     pub threshold: [f64; 6],
-    /// Reduction over all channels.
+    /// Sum of the reductions over all channels.
     pub total: f64,
-    /// Reduction that chance reaches over all channels.
+    /// Critical value of the sum for pure noise.
     pub total_threshold: f64,
 }
 
-/// One channel: features of each fold, targets, ridge solutions.
+/// Data of one channel, divided into the folds of the cross-validation.
 struct Channel {
     folds: Vec<Fold>,
 }
@@ -39,12 +40,12 @@ struct Fold {
     target: DVector<f64>,
     noise: DVector<f64>,
     blocks: Vec<usize>,
-    /// Factorisations fitted on the other folds, one for each ridge parameter.
+    /// Cholesky factors of the normal equations of all other folds, one for each ridge parameter.
     others: Vec<Cholesky<f64, Dyn>>,
 }
 
-/// Error that a flexible model could remove from the residual of `round`. The thresholds have the significance `level` and
-/// come from `count` draws of noise.
+/// Computes the part of the residual of `round` that a flexible model could remove. The critical values have the
+/// significance level `level` and come from `count` draws of noise.
 pub fn remainder(round: &Round, count: usize, level: f64) -> Remainder {
     let channels: Vec<Option<Channel>> =
         (0..6).into_par_iter().map(|c| channel(round, c)).collect();
@@ -109,13 +110,13 @@ fn channel(round: &Round, channel: usize) -> Option<Channel> {
     Some(Channel { folds })
 }
 
-/// Features, noise and residual of one cell.
+/// Projected features, noise and residual of one channel of one flight.
 type Projected = (DMatrix<f64>, DVector<f64>, DVector<f64>);
 
 /// Whitened features of unit RMS, noise and residual of each cell, with the nuisance parameters projected out.
 ///
-/// The projection is ordinary least squares without the correction for shared noise. A flexible model would otherwise fit the
-/// bias due to shared noise.
+/// The projection is an ordinary least-squares fit without the errors-in-variables correction. The flexible model would
+/// otherwise fit the bias that the correction leaves in the residual.
 fn projected_features(round: &Round, cells: &[usize]) -> Option<Vec<Projected>> {
     let na = round.known.len();
     let mut all = Vec::new();
@@ -167,8 +168,8 @@ fn projected_features(round: &Round, cells: &[usize]) -> Option<Vec<Projected>> 
 }
 
 impl Channel {
-    /// Reduction of the squared error of held-out folds with the best ridge parameter, at least zero. The target is the residual,
-    /// or noise with `signs` of its blocks.
+    /// Reduction of the sum of squares of held-out folds with the best ridge parameter, at least zero. The target is
+    /// the residual. If `signs` is given, the target is the noise, multiplied by the sign of each block.
     fn gain(&self, signs: Option<&[f64]>) -> f64 {
         let targets: Vec<DVector<f64>> = self
             .folds

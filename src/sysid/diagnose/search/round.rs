@@ -1,4 +1,5 @@
-//! A round of the search: a model linearised over all flights, with every candidate's columns.
+//! A round of the search: the model, linearised over all flights, with the regressors (columns) of all candidate
+//! effects.
 
 mod known;
 mod shared_noise;
@@ -21,28 +22,30 @@ use shared_noise::{Setting, shared, sum};
 
 /// Largest number of times a nonlinear candidate is linearised again at its best fit.
 const REFINEMENTS: usize = 3;
-/// Iterations of the second-order correction of the clocks.
+/// Number of iterations of the second-order correction for the delay of the actuator record.
 const CURVATURES: usize = 2;
-/// A nonlinear candidate is linearised again if its reduction exceeds this share of the largest one.
+/// A nonlinear candidate is linearised again if its reduction of the residual sum of squares exceeds this share of the
+/// largest reduction.
 const WORTH: f64 = 0.2;
-/// It is also linearised again if its evidence is within this of the largest one.
+/// A nonlinear candidate is also linearised again if its evidence is less than this amount below that of the best
+/// candidate.
 const CLOSE: f64 = 40.0;
-/// A candidate counts as linearised near zero if its estimated amount exceeds the amount at the point of linearisation
-/// by this factor.
+/// A candidate counts as linearised near zero if the estimates of its linear coefficients exceed their values at the
+/// point of linearisation by this factor.
 const NOTHING: f64 = 1e3;
 
-/// Data that all rounds share.
+/// Data common to all rounds of a search.
 #[derive(Clone)]
 pub struct Problem {
-    /// The flights on the model's clock.
+    /// The flights, resampled to a multiple of the model step.
     pub flights: Vec<Prepared>,
-    /// Prior mean and width of each coefficient of the model as given.
+    /// Prior mean and standard deviation of each coefficient of the model as given, in the order of the coefficients.
     pub prior: Vec<(f64, f64)>,
-    /// Errors of the reconstructed paths.
+    /// Errors of the reconstructed airspeed, α and β, by flight.
     pub path: Vec<shared::PathError>,
-    /// Prior widths of the sensor errors, by flight.
+    /// Prior standard deviations of the sensor errors, by flight.
     pub sensors: Vec<[f64; SENSORS]>,
-    /// Constants estimated for each flight in addition.
+    /// Constants that are estimated for each flight in addition to the sensor errors.
     pub per_flight: PerFlight,
     /// Seed of all random draws.
     pub seed: u64,
@@ -51,58 +54,61 @@ pub struct Problem {
 /// Results of other rounds that a round may use.
 #[derive(Clone, Copy, Default)]
 pub struct Beside<'a> {
-    /// The noise; estimated from this round if `None`.
+    /// Noise of the channels. If `None`, the round estimates it.
     pub noise: Option<&'a Noise>,
-    /// Model that predicts the accelerations in the columns of mass and inertia; `None` for the round's own model,
-    /// which may be too inaccurate.
+    /// Model whose predicted accelerations enter the regressors of mass and inertia. If `None`, the round's own model
+    /// predicts them.
     pub accelerating: Option<&'a GreyBox>,
 }
 
 /// A model linearised over the flights.
 pub struct Round {
-    /// The linearised model.
+    /// The model that is linearised.
     pub model: GreyBox,
-    /// The flights under this model.
+    /// The flights with residuals and regressors of the sensor errors under this model.
     pub flights: Vec<Ready>,
-    /// Cells of the flights.
+    /// Division of the windows into cells: one for each channel of each flight.
     pub cells: Cells,
-    /// Nuisance parameters: coefficients, each flight's own constants, and sensor errors.
+    /// Nuisance parameters in this order: free coefficients of the model, constants of all flights, sensor errors of
+    /// all flights.
     pub known: Vec<Known>,
-    /// Index of each free coefficient in the model's list.
+    /// Index of each free coefficient among all coefficients of the model.
     pub coefficients: Vec<usize>,
-    /// Selection of the constants of each flight, which follow the coefficients in `known`.
+    /// Selection of the constants that are estimated for each flight.
     pub per_flight: PerFlight,
-    /// The candidates with their columns.
+    /// The candidate effects, with the indices of their regressors.
     pub trials: Vec<Trial>,
-    /// Columns with the nuisance parameters projected out.
+    /// Gram matrices of the candidates' columns and the residual, with the nuisance parameters projected out.
     pub projected: Projected,
-    /// Columns by flight: nuisance parameters, candidates, residual, features.
+    /// Columns by flight: regressors of the nuisance parameters, regressors of the candidates, residual, features of
+    /// the flexible model.
     pub placed: Vec<Placed>,
-    /// Index of the residual in `placed`.
+    /// Index of the residual among the columns in `placed`.
     pub last: usize,
     /// Noise of the channels.
     pub noise: Noise,
-    /// Number of coefficients of the model as given; later ones belong to effects that have joined.
+    /// Number of coefficients of the model as given. Coefficients with higher indices belong to added effects.
     pub given: usize,
     /// Seed of all random draws.
     pub seed: u64,
     /// Descriptions of the candidates.
     pub entries: Vec<Entry>,
     refined: Vec<(&'static str, Vec<f64>)>,
-    /// Spurious products of the columns with the residual due to noise that they share, by flight and index.
+    /// Bias of the products of columns and residual, by flight and index of the column. It is due to noise that both
+    /// have in common (errors in variables).
     pub shared: Vec<Vec<f64>>,
-    /// Columns of the nuisance parameters and the linear candidates for the flights with additional simulated noise, at
-    /// the same indices.
+    /// Columns of the nuisance parameters and linear candidates after simulated noise has been added to the flights.
+    /// The indices are those of `placed`.
     pub disturbed: Vec<Placed>,
 }
 
 impl Round {
-    /// Linearises `model` with `entries` as candidates; `None` if it cannot be evaluated over the flights.
+    /// Linearises `model` with `entries` as candidates. `None` if the model cannot be evaluated over the flights.
     pub fn new(problem: &Problem, model: GreyBox, entries: &[Entry]) -> Option<Round> {
         Round::beside(problem, model, entries, Beside::default())
     }
 
-    /// As [`Round::new`], with results of other rounds.
+    /// Does the same as [`Round::new`], with results of other rounds.
     pub fn beside(
         problem: &Problem,
         model: GreyBox,
@@ -160,8 +166,8 @@ impl Round {
         })
     }
 
-    /// Scores of all candidates in descending order of rank. Nonlinear candidates near the top are linearised again at
-    /// their best fit.
+    /// Returns the indices and scores of all candidates, the best first. Nonlinear candidates near the top are
+    /// linearised again at their best fit.
     pub fn rank(&mut self) -> Vec<(usize, Score)> {
         let mut scores = self.scores();
         for _ in 0..REFINEMENTS {
@@ -188,8 +194,9 @@ impl Round {
         scores
     }
 
-    /// Next point of linearisation of a candidate: its best values. If it was linearised near zero, its shape
-    /// constants are kept, since their derivatives vanish there.
+    /// Next point of linearisation of a candidate: its estimated coefficients. A candidate that was linearised near
+    /// zero keeps its shape constants (nonlinear coefficients), because the derivatives with respect to them vanish
+    /// there.
     fn next_place(&self, trial: &Trial, score: &Score) -> Vec<f64> {
         let start = &trial.points[score.point].values;
         let mut next = score.values.clone();
@@ -202,7 +209,7 @@ impl Round {
         next
     }
 
-    /// Adds points of linearisation; `false` if that is not possible.
+    /// Adds points of linearisation. Returns `false` if the regressors with these points cannot be used.
     fn refine(&mut self, wanted: Vec<(&'static str, Vec<f64>)>) -> bool {
         self.refined.extend(wanted);
         let made = catalogue::columns(&self.model, &self.flights, &self.entries, &self.refined);
@@ -224,7 +231,8 @@ impl Round {
         true
     }
 
-    /// Spurious products from shared noise over all flights, by index.
+    /// Bias of the products of columns and residual due to common noise, summed over all flights, by index of the
+    /// column.
     pub fn shared(&self) -> Vec<f64> {
         sum(&self.shared)
     }
@@ -243,7 +251,7 @@ impl Round {
         scores
     }
 
-    /// Whether a free coefficient of the trial is at its physical bound.
+    /// Whether a free coefficient of the candidate with the index `trial` is at its physical bound.
     pub fn at_bound(&self, trial: usize, score: &Score) -> bool {
         let trial = &self.trials[trial];
         let Some(entry) = self.entries.iter().find(|e| e.about.id == trial.id) else {
@@ -257,8 +265,9 @@ impl Round {
         })
     }
 
-    /// Wald statistic of all free constants of a joined effect against zero. `None` if the effect is nonlinear in them
-    /// and not an input effect, because zero then does not mean that the effect is absent.
+    /// Wald statistic of the added effect `id` for the hypothesis that all its free coefficients are zero. `None` if no
+    /// coefficient is free. `None` also if the effect is nonlinear in a coefficient and does not act on the inputs:
+    /// zero coefficients then do not mean that the effect is absent.
     pub fn amount(&self, id: &str) -> Option<f64> {
         let prefix = format!("{id}.");
         let operator = greylag_physics::inputs::Kind::from_id(id).is_some();
@@ -279,12 +288,13 @@ impl Round {
     }
 }
 
-/// The columns of the list up to index `place`, that one included.
+/// Columns of `list` up to and including the index `place`.
 fn up_to(list: &Placed, place: usize) -> Placed {
     list.iter().take_while(|(p, _)| *p <= place).cloned().collect()
 }
 
-/// Appends the columns of candidates and residual to those of the nuisance parameters. Returns the residual's index.
+/// Appends the candidates' columns and the residual to the columns of the `count` nuisance parameters. Returns the
+/// index of the residual.
 fn place(placed: &mut [Placed], count: usize, made: &Columns, flights: &[Ready]) -> usize {
     let last = count + made.columns.first().map_or(0, Vec::len);
     for ((list, own), flight) in placed.iter_mut().zip(&made.columns).zip(flights) {
@@ -294,7 +304,7 @@ fn place(placed: &mut [Placed], count: usize, made: &Columns, flights: &[Ready])
     last
 }
 
-/// Columns of the rich fit: all but the derivatives of nonlinear candidates.
+/// Columns for the estimate of the noise: all except the derivatives of nonlinear candidates.
 fn rich(placed: &[Placed], count: usize, trials: &[Trial]) -> Vec<Placed> {
     let curved = trials.iter().flat_map(|t| &t.points).filter(|p| p.contribution.is_some());
     let left_out: Vec<usize> = curved.flat_map(|p| p.free.iter().map(|f| count + f.1)).collect();

@@ -1,4 +1,4 @@
-//! Ranking of the candidate effects, and tuning of the model after a candidate has been added.
+//! Ranking of the candidate effects, and re-estimation of the model after a candidate has been added.
 
 use crate::diagnose::options::Options;
 use crate::diagnose::regression::rank::Score;
@@ -6,10 +6,11 @@ use crate::diagnose::search::nulls;
 use crate::diagnose::search::round::{Beside, Problem, Round};
 use greylag_model::GreyBox;
 
-/// Number of tuning passes after an effect has been added. Nonlinear effects need several passes to converge.
+/// Number of passes in which all coefficients are re-estimated after an effect has been added. Nonlinear effects need
+/// several passes to converge.
 pub const SETTLING: usize = 3;
-/// Largest relative change of a mass or inertia estimate in tuning. A larger change shows that the model's accelerations were
-/// too inaccurate for the estimate.
+/// Largest relative change of a mass or inertia estimate in the re-estimation. A larger change shows that the model's
+/// accelerations were too inaccurate for the estimate.
 const ASTRAY: f64 = 0.1;
 
 /// A round of the search with the scores of its candidates.
@@ -18,14 +19,15 @@ pub struct Ranked {
     pub round: Round,
     /// Indices and scores of the candidates, in descending order of rank.
     pub scores: Vec<(usize, Score)>,
-    /// Best evidence in each simulated flight without a missing effect (null flight).
+    /// Evidence of the best candidate in each bootstrap draw under the null hypothesis that no effect is missing,
+    /// ascending.
     pub nulls: Vec<f64>,
-    /// Evidence that a candidate must exceed.
+    /// Critical value that the evidence of a candidate must exceed.
     pub threshold: f64,
 }
 
-/// Ranks the candidates of `round`. The regressors of mass and inertia contain accelerations predicted by the model. If these
-/// are too inaccurate, a better model predicts them.
+/// Ranks the candidates of `round`. The regressors of mass and inertia contain accelerations that the model predicts.
+/// If these are too inaccurate, the ranking is repeated with the accelerations of a better model.
 pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
     let rank = |mut round: Round| {
         let scores = round.rank();
@@ -40,12 +42,13 @@ pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
     }
 }
 
-/// The round whose regressors of mass and inertia contain the accelerations of a better model: the round's model with the
-/// best-ranked change of mass or inertia, added and tuned.
+/// Repeats a round with the accelerations of a better model in the regressors of mass and inertia. The better model is
+/// obtained from the model of the round: the best-ranked change of mass or inertia is added, and all coefficients are
+/// re-estimated.
 ///
-/// A large inertia error of the model makes these regressors wrong. The estimates then differ between flights and are all too
-/// small. `None` if no change of mass or inertia exceeds the threshold, if tuning changes its first coefficient by at most
-/// `ASTRAY`, or if a model cannot be linearised.
+/// A large inertia error of the model makes these regressors wrong. The estimates then differ between flights and are
+/// all too small. `None` if no change of mass or inertia exceeds the critical value, if the re-estimation changes its
+/// first coefficient by at most `ASTRAY`, or if a model cannot be linearised.
 fn accelerated(problem: &Problem, ranked: &Ranked) -> Option<Round> {
     let Ranked { round, scores, threshold, .. } = ranked;
     let of_body = |trial: usize, score: &Score| {
@@ -71,7 +74,8 @@ fn accelerated(problem: &Problem, ranked: &Ranked) -> Option<Round> {
     Round::beside(problem, round.model.clone(), &round.entries, beside)
 }
 
-/// `model` after `passes` tuning passes with the noise of `round`, and its squared whitened error before the last pass.
+/// Re-estimates all coefficients of `model` in `passes` passes with the noise of `round`. Returns the model, and its
+/// whitened residual sum of squares before the last pass. `None` if the model cannot be linearised.
 pub fn settled(
     problem: &Problem,
     round: &Round,

@@ -1,9 +1,9 @@
-//! Residual shape: products of states and deflections that explain part of the residual. If they explain the residual after
-//! an effect was added, the formula of the effect differs from the true one.
+//! Lack-of-fit test: regression of the residual on products of states and deflections. If these explain a residual that
+//! remains after an effect was added, the formula of the effect differs from the true one.
 //!
-//! The flexible model of [`remainder`](super::remainder) must generalise to other flights and detects only large errors.
-//! Here, a few terms like those of aerodynamic tables are fitted to the same flights. Their reduction of the error is
-//! compared with their reduction of noise.
+//! The flexible model of [`remainder`](super::remainder) must generalise to other flights and detects only large
+//! errors. This test fits a few terms, similar to those of aerodynamic tables, to the same flights. It compares the
+//! reduction of the residual with the reduction that the terms achieve on pure noise.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -23,50 +23,56 @@ use greylag_num::statistics::mean;
 const NAMES: [&str; 9] = ["α", "β", "V", "p", "q", "r", "δa", "δe", "throttle"];
 /// Number of squares and pairwise products.
 const PRODUCTS: usize = NAMES.len() * (NAMES.len() + 1) / 2;
-/// Second derivatives of the deflections. A first-order lag and a pure delay agree to first order and differ in these.
+/// Names of the second derivatives of the deflections. A first-order lag and a pure delay have the same first-order
+/// effect and differ in these derivatives.
 const BENT: [&str; 2] = ["δa″", "δe″"];
-/// Number of terms of a channel.
+/// Number of terms in each channel.
 const TERMS: usize = PRODUCTS + BENT.len();
 /// Ridge parameter for nearly collinear terms, relative to a term's squared norm.
 const RIDGE: f64 = 1e-4;
-/// Number of standard deviations beyond which the terms' reduction is significant.
+/// The reduction by the terms is significant if it exceeds the mean reduction of noise by this number of standard
+/// deviations.
 const DOUBT: f64 = 4.0;
-/// Squared whitened error per row that the terms may remove because of remaining errors of sensors and path.
+/// Reduction of the residual sum of squares per row that remaining errors of sensors and path may cause. Pure noise has
+/// a mean square of 1 per row.
 const UNSURE: f64 = 0.1;
-/// Squared whitened error per row above which the terms alone indicate a missing effect. Without a missing effect, they
-/// remove at most 0.13.
+/// Reduction of the residual sum of squares per row above which the terms alone indicate a missing effect. Without a
+/// missing effect, it was at most 0.13.
 const ALARM: f64 = 0.15;
-/// Squared whitened error that second derivatives may remove. With correct models, they remove up to 25.
+/// Reduction of the residual sum of squares in a channel above which second derivatives count. With correct models,
+/// they reached at most 25.
 const BENDING: f64 = 30.0;
 
-/// Reduction of the squared whitened error by the terms, by channel.
+/// Reduction of the whitened residual sum of squares by the terms, by channel.
 #[derive(Clone, Debug)]
 pub struct Shape {
     channels: Vec<Taken>,
 }
 
-/// Reduction in one channel.
+/// Reduction of the residual sum of squares in one channel.
 #[derive(Clone, Debug)]
 struct Taken {
-    /// Reduction of the residual's squared error less the mean reduction of noise.
+    /// Reduction by all terms minus the mean reduction for pure noise.
     left: f64,
-    /// Standard deviation of the terms' reduction of noise.
+    /// Standard deviation of the reduction for pure noise.
     doubt: f64,
     rows: f64,
-    /// Index of the term that alone reduces the error most.
+    /// Index of the term that alone reduces the residual most.
     most: usize,
     /// Reduction by the second derivatives alone.
     bent: f64,
 }
 
 impl Shape {
-    /// The term that correlates most with the residual of `channel`, if the residual indicates a missing effect.
+    /// Name of the term that explains most of the residual of `channel`. `None` unless the residual indicates a missing
+    /// effect.
     pub fn term(&self, channel: usize) -> Option<String> {
         self.left_in(&[channel], ALARM).map(|_| name(self.channels[channel].most))
     }
 
-    /// Share of the terms in the reduction by terms and effects in `channels`, and the name of the term that removes most. `fall`
-    /// is the reduction by effects. `None` if the terms' reduction is not significant.
+    /// Compares the terms with effects that reduce the residual sum of squares in `channels` by `fall`. Returns the
+    /// terms' share of both reductions together, and the name of the strongest term. `None` if the reduction by the
+    /// terms is not significant.
     pub fn beside(&self, channels: &[usize], fall: f64) -> Option<(f64, String)> {
         let left = self.left_in(channels, UNSURE)?;
         let own = channels.iter().map(|c| &self.channels[*c]);
@@ -74,8 +80,9 @@ impl Shape {
         Some((left / (left + fall), name(most)))
     }
 
-    /// Share of the second derivatives of the deflections in the reduction by these and by an effect, over all channels. `fall`
-    /// is the reduction by the effect. Zero if the derivatives do not remove more than with correct models.
+    /// Compares the second derivatives of the deflections with an effect that reduces the residual sum of squares by
+    /// `fall`. Returns the derivatives' share of both reductions together, over all channels. A channel counts only if
+    /// its reduction exceeds that of correct models.
     pub fn bends_beside(&self, fall: f64) -> f64 {
         let bent = self.channels.iter().map(|c| c.bent).filter(|bent| *bent > BENDING).sum::<f64>();
         bent / (bent + fall).max(f64::MIN_POSITIVE)
@@ -92,8 +99,8 @@ impl Shape {
     }
 }
 
-/// Reduction of the residual of `round` by the terms, compared with `count` draws of noise. The round must have no
-/// candidates. `None` if the terms cannot be fitted.
+/// Computes the reduction of the residual of `round` by the terms and compares it with `count` draws of noise. The
+/// round must have no candidates. `None` if the terms cannot be fitted.
 pub fn shape(round: &Round, count: usize) -> Option<Shape> {
     let na = round.known.len();
     let last = na + CHANNELS * TERMS;
@@ -106,7 +113,7 @@ pub fn shape(round: &Round, count: usize) -> Option<Shape> {
         list
     };
     let placed: Vec<Placed> = round.placed.iter().zip(&round.flights).map(place).collect();
-    // ordinary least squares: a residual corrected for shared noise is not in the span of the columns
+    // ordinary least squares: with the errors-in-variables correction, the products would not be those of any residual
     let p = Projected::new(&round.cells, &placed, last, &round.known, &round.noise, &[])?;
     let measured = p.total.column(p.width()).into_owned();
     let draws: Vec<DVector<f64>> =
@@ -121,8 +128,8 @@ pub fn shape(round: &Round, count: usize) -> Option<Shape> {
     Some(Shape { channels: (0..CHANNELS).map(of).collect::<Option<_>>()? })
 }
 
-/// Reduction by terms with the Gram matrix `gram` and the products `measured` with the residual, compared with their products
-/// `draws` with noise.
+/// Reduction by the terms of one channel. `gram` is their Gram matrix. `measured` holds their products with the
+/// residual, `draws` their products with draws of noise. `None` if the Gram matrix is singular.
 fn taken(
     gram: &DMatrix<f64>,
     measured: &DVector<f64>,
@@ -149,7 +156,8 @@ fn taken(
     })
 }
 
-/// Columns of the terms of `flight`, by channel, multiplied by dynamic pressure times wing area.
+/// Regressors of the terms for `flight`, channel after channel. Each term is multiplied by dynamic pressure times wing
+/// area (N).
 fn terms(model: &GreyBox, flight: &Ready, spread: &[[f64; 2]; NAMES.len()]) -> Vec<Column> {
     let sides = gather(&flight.acting, Integrator::Jsbsim, TERMS, |place, add| {
         let z = standard(variables(&flight.acting, place.segment, place.index), spread);
@@ -176,7 +184,7 @@ fn terms(model: &GreyBox, flight: &Ready, spread: &[[f64; 2]; NAMES.len()]) -> V
     (0..CHANNELS).flat_map(of).collect()
 }
 
-/// Index pairs of the products.
+/// Pairs of indices in `NAMES`, one for each product.
 fn pairs() -> impl Iterator<Item = (usize, usize)> {
     (0..NAMES.len()).flat_map(|i| (i..NAMES.len()).map(move |j| (i, j)))
 }

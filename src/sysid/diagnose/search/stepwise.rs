@@ -1,4 +1,5 @@
-//! Forward selection: adds the effect with the best evidence to the model, until no candidate passes.
+//! Forward selection: adds the candidate effect with the most evidence to the model and repeats the search until no
+//! candidate passes the checks.
 
 mod examine;
 mod found;
@@ -26,19 +27,20 @@ use examine::examine;
 use greylag_model::{GreyBox, RUDDER};
 use run_off::run_off;
 
-/// Share of the work done once all candidates have been ranked.
+/// Estimated share of the work that is done after the first ranking of the candidates.
 const RANKED: f64 = 0.3;
 /// Largest number of effects added to the model.
 const MOST: usize = 6;
-/// Largest number of tuning passes after an effect has been added. If two coefficients multiply each other (a saturation
-/// limit and an effectiveness), the linearised tuning converges slowly and needs more passes than [`SETTLING`].
+/// Largest number of passes in which all coefficients are re-estimated after an effect has been added. If two
+/// coefficients multiply each other (a saturation limit and an effectiveness), the linearised estimates converge slowly
+/// and need more passes than [`SETTLING`].
 const MOST_SETTLING: usize = 12;
-/// Convergence tolerance of tuning: largest change of a coefficient in its standard deviations.
+/// Convergence tolerance of the re-estimation: largest change of a coefficient in one pass, in its standard deviations.
 const STEP_TOLERANCE: f64 = 0.2;
 /// Largest number of refused candidates that are set aside; the next refusal ends the search.
 const MOST_ASIDE: usize = 4;
 
-/// Searches for the effects that `model` lacks.
+/// Searches for the effects that `model` lacks, and tests each one before it is added.
 ///
 /// # Errors
 /// The model cannot be evaluated over the flights, or `progress` cancelled.
@@ -92,7 +94,8 @@ pub fn search(
     Ok(found)
 }
 
-/// Adds the best candidates one by one until none passes. Returns the refused candidates that were set aside.
+/// Adds the best candidates one by one until none passes the checks. Returns the refused candidates that were set
+/// aside.
 fn select(
     problem: &Problem,
     model: &GreyBox,
@@ -131,8 +134,8 @@ fn select(
     Ok(aside)
 }
 
-/// The last record of each effect. A candidate that was set aside is ranked again after another effect has been added,
-/// and may be refused again.
+/// Keeps the last record of each effect in `refused`. A candidate that was set aside is ranked again after another
+/// effect has been added, and may be refused again.
 fn latest(refused: Vec<Selected>) -> Vec<Selected> {
     let mut kept: Vec<Selected> = Vec::new();
     for one in refused {
@@ -142,7 +145,7 @@ fn latest(refused: Vec<Selected>) -> Vec<Selected> {
     kept
 }
 
-/// The candidates in the first ranking, for progress reports.
+/// Summary of the first ranking for progress reports.
 fn first_look(round: &Round, scores: &[(usize, Score)], threshold: f64) -> Vec<FirstLook> {
     let of = |(trial, score): &(usize, Score)| FirstLook {
         id: round.trials[*trial].id,
@@ -152,7 +155,7 @@ fn first_look(round: &Round, scores: &[(usize, Score)], threshold: f64) -> Vec<F
     scores.iter().map(of).collect()
 }
 
-/// `current` with the effect `id` removed. `given` must not contain `id`.
+/// The model `current` without the added effect `id`. `given` is the model before any effect was added.
 fn without(given: &GreyBox, current: &GreyBox, id: &str) -> GreyBox {
     let mut model = given.clone();
     let joined: Vec<&'static str> =
@@ -163,7 +166,7 @@ fn without(given: &GreyBox, current: &GreyBox, id: &str) -> GreyBox {
         of.map(|c| c.value).collect()
     };
     for effect in joined {
-        // its values were valid before, so joining cannot fail
+        // these values were valid in `current`, so the effect can be added
         let _ = model.join(effect, &own(effect));
     }
     for c in current.coefficients().iter().filter(|c| {
@@ -177,8 +180,8 @@ fn without(given: &GreyBox, current: &GreyBox, id: &str) -> GreyBox {
 
 impl Found {
     /// Adds the effect selected last to the model and ranks the remaining candidates. An earlier effect that becomes
-    /// insignificant is removed. `false` if the effect cannot join or the model with it cannot be linearised; the
-    /// search then ends.
+    /// insignificant is removed. Returns `false`, which ends the search, if the effect cannot be added or if the model
+    /// with it cannot be linearised.
     fn join(
         &mut self,
         problem: &Problem,
@@ -213,8 +216,9 @@ impl Found {
         Ok(true)
     }
 
-    /// Tunes `model`, which contains the effect selected last, until convergence or for `MOST_SETTLING` passes. An earlier
-    /// effect that becomes insignificant is removed, and tuning stops. `None` if the model cannot be linearised.
+    /// Re-estimates the coefficients of `model`, which contains the effect selected last, until convergence or for
+    /// `MOST_SETTLING` passes. If an earlier effect becomes insignificant, it is removed, and the passes end. Returns a
+    /// round without candidates; `None` if the model cannot be linearised.
     fn settle(
         &mut self,
         problem: &Problem,
@@ -243,7 +247,8 @@ impl Found {
         Ok(Round::new(problem, model, &[]))
     }
 
-    /// Estimated share of the work done; the number of effects to be selected is not known in advance.
+    /// Estimated share of the work that is done, 0 to 1. The number of effects is not known in advance: each selected
+    /// effect halves the share that is left.
     fn fraction(&self) -> f64 {
         let left = 0.5_f64.powi(self.selected.len() as i32);
         RANKED + (0.9 - RANKED) * (1.0 - left)

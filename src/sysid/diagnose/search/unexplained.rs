@@ -32,8 +32,8 @@ fn measured(first: &Round) -> [Option<Measured>; CHANNELS] {
     })
 }
 
-/// Mean square of the finite values in `channel`. An empty column means zeros. NaN if no value is finite, for example
-/// because the model predicts no number.
+/// Mean square of the finite values of `residual` in `channel`. An empty column means zeros. NaN if no value is finite,
+/// for example because the model predicts NaN.
 fn mean_square(residual: &[Column], channel: usize) -> f64 {
     if residual.iter().all(|c| c[channel].is_empty()) {
         return 0.0;
@@ -42,15 +42,16 @@ fn mean_square(residual: &[Column], channel: usize) -> f64 {
     mean(&finite.map(|x| x * x).collect::<Vec<f64>>())
 }
 
-/// Share of `variance` that the mean square `left` exceeds the noise by, at least 0. A `left` of NaN has the share NaN,
-/// which `f64::max` would replace by 0.
+/// Excess of the mean square `left` over the noise variance `noise`, as a share of `variance`; at least 0. NaN if
+/// `left` is NaN (`f64::max` would return 0).
 fn share(left: f64, noise: f64, variance: f64) -> f64 {
     let share = (left - noise) / variance;
     if share < 0.0 { 0.0 } else { share }
 }
 
-/// Share of each channel's variance beyond noise that remains in `residual` (one column a flight), with the noise under
-/// the model of `first`. NaN if the flights do not measure the channel or the model predicts no number in it.
+/// Share of each channel's variance beyond noise that remains in `residual`, which has one entry for each flight. The
+/// variance of the noise is computed with the model of `first`. NaN if the flights do not measure the channel or the
+/// model predicts no number in it.
 pub fn unexplained(first: &Round, residual: &[Column]) -> [f64; CHANNELS] {
     let measured = measured(first);
     std::array::from_fn(|k| match &measured[k] {
@@ -59,8 +60,8 @@ pub fn unexplained(first: &Round, residual: &[Column]) -> [f64; CHANNELS] {
     })
 }
 
-/// Decrease of the mean square residual from `before` to `after` as a share of each channel's variance beyond noise. Negative
-/// for an increase; 0 if the flights do not measure the channel.
+/// Decrease of the mean square residual from `before` to `after`, as a share of each channel's variance beyond noise.
+/// It is negative if the residual increases, and 0 if the flights do not measure the channel.
 pub fn explained(first: &Round, before: &[Column], after: &[Column]) -> [f64; CHANNELS] {
     let measured = measured(first);
     std::array::from_fn(|k| match &measured[k] {

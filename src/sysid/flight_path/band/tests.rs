@@ -1,9 +1,9 @@
-//! Elimination and solution of given equations, against dense matrices.
+//! Tests of the elimination and the solution against dense matrices.
 
 use super::*;
 use nalgebra::{DMatrix, DVector};
 
-/// Given equations, with unit prior information on every unknown of an instant.
+/// Equations from given links, with unit prior information on every unknown of an instant.
 struct Given<const N: usize, const W: usize> {
     links: Vec<Link<N, W>>,
 }
@@ -20,7 +20,7 @@ impl<const N: usize, const W: usize> Equations<N, W> for Given<N, W> {
     }
 }
 
-/// Instants that are eliminated again have the same solution to the bit.
+/// A repeated elimination of the instants gives the same solution to the last bit.
 #[test]
 fn parts_equal_the_whole() {
     let mut seed = 1_u64;
@@ -61,7 +61,7 @@ fn band_equals_dense() {
     const C: usize = 5;
     const COUNT: usize = 7;
     let size = COUNT * N + C;
-    // residuals with pseudo-random coefficients, each touching two neighbours and the constants
+    // residuals with pseudo-random coefficients; each depends on two adjacent instants and on the constants
     let mut seed = 1_u64;
     let mut random = || {
         seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -116,7 +116,7 @@ fn band_equals_dense() {
         }
     }
     assert!((p.clone() - reference.rows(COUNT * N, C)).norm() < 1e-11);
-    // the least sum of squares: Σ r² less its reduction by the dense solution
+    // the least sum of squares is Σ r² less its reduction by the dense solution
     let least = left.corner[C][C] - b.dot(&p);
     assert!((least - (corner[C][C] - right.dot(&reference))).abs() < 1e-11);
     let log_det = left.log_det + factor.determinant().ln();

@@ -11,12 +11,12 @@ use crate::flight_path::measurement::{self, Others, Reading};
 use crate::flight_path::nuisance::Values;
 use crate::flight_path::path::{CHANNELS, Path};
 
-/// Ratio of the bound beyond which a kinematic step is down-weighted to that of the measurements. With a launcher, an impact
-/// or an estimator that aligns itself, the logged path moves by more than gyros and accelerometers measure.
+/// Residuals of kinematic steps are down-weighted beyond this multiple of the bound for measurements. At a launch, an
+/// impact or an alignment of the log's estimator, the logged path moves more than gyros and accelerometers measure.
 pub const PROCESS: f64 = 1.5;
 
-/// Equations of a stretch along the present path, with `N` unknowns for each instant, `M` columns of constants that act
-/// at instants, and `D` of those that act between them.
+/// Equations of a stretch along the present path, with `N` unknowns for each instant. `M` columns belong to constants that
+/// act at instants, `D` columns to constants that act between instants.
 pub struct Along<'a, const N: usize, const M: usize, const D: usize> {
     problem: &'a Problem<'a>,
     path: &'a Path,
@@ -24,10 +24,10 @@ pub struct Along<'a, const N: usize, const M: usize, const D: usize> {
     /// Measurements less their predictions.
     pub readings: Vec<Reading>,
     drive: Drive,
-    /// First gust of the path, and the level of the gusts, m/s.
+    /// Gust at the first instant of the path; `gusts` is the standard deviation of gusts. Both in m/s.
     pub first: Vector3<f64>,
     gusts: f64,
-    /// Standard deviations of the channels and of the steps.
+    /// Standard deviations of the measured channels; `sd` are those of the kinematic steps.
     pub spread: [f64; CHANNELS],
     pub sd: [f64; N],
     bound: f64,
@@ -62,7 +62,7 @@ impl<'a, const N: usize, const M: usize, const D: usize> Along<'a, N, M, D> {
         }
     }
 
-    /// The step from sample `k` to the next one.
+    /// The kinematic step from sample `k` to the next one.
     pub fn step(&self, k: usize) -> Step<N, D> {
         let (step, gravity) = (self.problem.log.step, self.problem.options.gravity);
         self.drive.step::<N, D>(self.path, self.values, k, step, gravity)
@@ -98,7 +98,7 @@ impl<const N: usize, const W: usize, const M: usize, const D: usize> band::Equat
     }
 }
 
-/// Standard deviations of the differences between samples `step` (s) apart.
+/// Standard deviations of the residuals of a kinematic step over `step` (s): attitude (rad), velocity (m/s), gust (m/s).
 pub fn step_deviations<const N: usize>(levels: &Levels, step: f64) -> [f64; N] {
     let gust = levels.gusts * (1.0 - gust_kept(step).powi(2)).sqrt();
     std::array::from_fn(|i| match i {
@@ -108,8 +108,8 @@ pub fn step_deviations<const N: usize>(levels: &Levels, step: f64) -> [f64; N] {
     })
 }
 
-/// Prior of an initial instant: standard deviations of 10 rad and 100 m/s, which hardly constrain the motion, and the level
-/// of the gusts.
+/// Prior of the first instant. Its standard deviations of 10 rad and 100 m/s hardly constrain the motion. The gust has the
+/// standard deviation `level`.
 fn start<const N: usize, const W: usize>(
     gust: &Vector3<f64>,
     level: f64,
@@ -129,8 +129,8 @@ fn start<const N: usize, const W: usize>(
     }
 }
 
-/// Equations of a step whose rows have the standard deviations `sd`; a residual beyond `bound` of them is
-/// down-weighted.
+/// Equations of a kinematic step whose rows have the standard deviations `sd`. A residual beyond `bound` standard
+/// deviations is down-weighted.
 pub fn weigh<const N: usize, const W: usize, const D: usize>(
     mut step: Step<N, D>,
     sd: &[f64; N],

@@ -16,7 +16,7 @@ use crate::flight_path::path::Path;
 use greylag_logs::Sampling;
 use greylag_num::stream::Stream;
 
-/// Paths with a simulated error of the same distribution as the error of the estimate.
+/// Estimated paths plus a simulated error of the same distribution as the error of the estimate.
 #[derive(Clone, Debug)]
 pub struct Erring {
     /// Path of each track.
@@ -26,8 +26,8 @@ pub struct Erring {
 }
 
 impl Problem<'_> {
-    /// Changes of the constants of [`calm`](Self::calm) if the air-data sensors had the residuals `others`, indexed by track
-    /// and instant. `None` if the equations are singular.
+    /// Changes of the constants that [`calm`](Self::calm) would estimate if the air-data sensors had the residuals
+    /// `others`, indexed by track and instant. `None` if the equations are singular.
     pub fn moved_by(
         &self,
         found: &Found,
@@ -47,8 +47,8 @@ impl Problem<'_> {
         }))
     }
 
-    /// The estimated paths with the error from one random draw of the noise of every sensor. The constants are held. `None` if
-    /// the equations are singular.
+    /// The estimated paths plus the error due to one random draw of the noise of every sensor. The constants are held.
+    /// `None` if the equations are singular.
     pub fn erring(&self, found: &Found, random: &mut Stream) -> Option<Erring> {
         let mut erring = Erring { paths: found.paths.clone(), gyro: Vec::new() };
         for (track, path) in self.log.tracks.iter().zip(&mut erring.paths) {
@@ -76,7 +76,7 @@ impl Problem<'_> {
             (0..path.len()).map(|_| std::array::from_fn(|_| unit())).collect();
         let mut along = Along::<N, 1, 1>::new(self, track, path, found, f64::INFINITY, None);
         along.first = Vector3::zeros();
-        // as in the fit: coloured noise counts as white noise with a larger standard deviation
+        // as in the fit, coloured noise is replaced by white noise with a larger standard deviation
         let spread = along.spread;
         for reading in &mut along.readings {
             *reading = reading.with(std::array::from_fn(|i| spread[i] * unit()));
@@ -90,10 +90,10 @@ impl Problem<'_> {
     }
 }
 
-/// Equations of a path's error in one draw of the noise of every sensor.
+/// Equations of a path's error due to one draw of the noise of every sensor.
 struct Drawn<'a, const N: usize> {
     along: Along<'a, N, 1, 1>,
-    /// Standard normal numbers of the steps.
+    /// Standard normal random numbers, one for each row of each kinematic step.
     noise: Vec<[f64; N]>,
     sampling: Sampling,
 }

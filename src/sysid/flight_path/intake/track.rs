@@ -1,4 +1,5 @@
-//! Resampling of a stretch to uniform time steps. Measurements may be missing, commands are held, deflections are complete.
+//! Resampling of a stretch to uniform time steps. Measurements may be missing, commands are held, deflections are always
+//! defined.
 
 use super::channels::Channels;
 use super::{Present, Track};
@@ -8,7 +9,8 @@ use greylag_physics::actuators::Actuators;
 use greylag_physics::atmosphere::{Atmosphere, Density};
 use greylag_physics::{Command, Controls};
 
-/// Interval over which the altitude is differenced to the climb rate, and between two entries of the integrated heading, s.
+/// Interval over which the altitude is differenced to obtain the climb rate, s. The integrated heading is stored once in
+/// each such interval.
 const CLIMB_WINDOW: f64 = 1.0;
 
 pub(super) fn track(

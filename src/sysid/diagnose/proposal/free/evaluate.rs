@@ -3,9 +3,10 @@
 use greylag_physics::formula::Variable;
 use greylag_physics::formula::expression::{Expression, Function, Node};
 
-/// Values of the expression `of` at `count` samples. `variable` returns the values of a variable at all samples.
+/// Values of the expression `of` at `count` samples. `constants` are the values of its parameters. `variable` returns
+/// the values of a variable at all samples.
 ///
-/// NaN if the expression depends on other samples than the present one, for example through a lag.
+/// NaN if the expression needs earlier samples, for example because of a lag.
 pub fn evaluate<'a>(
     of: &Expression,
     constants: &[f64],

@@ -1,4 +1,5 @@
-//! Expressions of at most nine nodes: functions of one variable, and products of up to three of them.
+//! Expressions of at most nine nodes: functions of one variable, products of up to three of these functions, and
+//! functions of a sum of two variables.
 
 use greylag_physics::formula::Variable;
 use greylag_physics::formula::dimension::Dimension;
@@ -17,10 +18,10 @@ pub struct Free {
     pub constants: Vec<f64>,
 }
 
-/// A variable with its range in the flights.
+/// A variable, with quantiles of its magnitude in the flights.
 #[derive(Clone, Copy, Debug)]
 pub struct Reach {
-    /// The variable itself.
+    /// The variable, an input of expressions.
     pub variable: Variable,
     /// The quantiles 0.5, 0.75 and 0.95 of the variable's magnitude.
     pub levels: [f64; 3],
@@ -41,7 +42,7 @@ pub fn positive(variable: Variable) -> bool {
 /// A factor of products: a function of one variable, or a function of a sum of two.
 #[derive(Clone, Debug)]
 pub struct Atom {
-    /// The expression and its constants.
+    /// The expression of the atom, with its constants.
     pub free: Free,
     /// Whether the atom is a divisor in products.
     pub below: bool,
@@ -52,9 +53,9 @@ pub struct Atom {
 enum Kind {
     /// The atom has no constant.
     Plain,
-    /// The atom's constant is the middle one of the levels tried.
+    /// The atom's constant is the middle one of the three quantiles.
     Middle,
-    /// The atom's constant is one of the other levels.
+    /// The atom's constant is the lowest or the highest quantile.
     Outer,
     /// The atom is a function of a sum and is not combined with other atoms.
     Sum,
@@ -74,7 +75,7 @@ pub struct Candidate {
 /// All expressions that are tried.
 #[derive(Clone, Debug)]
 pub struct Grammar {
-    /// Factors of products.
+    /// The atoms, which are factors of products.
     pub atoms: Vec<Atom>,
     /// Products with consistent units.
     pub candidates: Vec<Candidate>,
@@ -102,7 +103,7 @@ fn scaled(v: Expression) -> Expression {
 }
 
 impl Grammar {
-    /// Builds the expressions of `variables`. Variables whose 0.95 quantile is zero are left out.
+    /// Builds all expressions of `variables`. Variables whose 0.95 quantile is zero are left out.
     pub fn new(variables: &[Reach]) -> Grammar {
         let moving: Vec<Reach> = variables.iter().filter(|r| r.levels[2] > 0.0).copied().collect();
         let mut grammar = Grammar { atoms: Vec::new(), candidates: Vec::new() };
@@ -149,7 +150,7 @@ impl Grammar {
             if !reach.positive() {
                 let deadband = || call(Function::Deadband, [v(), c()]);
                 all.push(deadband());
-                // the variable less its dead band: a saturation
+                // the variable minus its dead-band function is a saturation
                 all.push(call(Function::Subtract, [v(), deadband()]));
                 let below = call(Function::Add, [v(), c()]);
                 all.push(call(Function::Min, [below, zero()]));
@@ -169,7 +170,7 @@ impl Grammar {
         }
     }
 
-    /// Adds functions of v + c·w.
+    /// Adds functions of the sum v + c·w.
     fn add_sums(&mut self, v: &Reach, w: &Reach) {
         let ratio = v.levels[1] / w.levels[1].max(f64::MIN_POSITIVE);
         if !ratio.is_finite() {
@@ -216,7 +217,8 @@ impl Grammar {
         }
     }
 
-    /// Adds the product of `parts` if each variable occurs once, the product is small enough, and its units are consistent.
+    /// Adds the product of the atoms `parts` if each variable occurs once, the product is small enough, and its units
+    /// are consistent.
     fn keep(&mut self, parts: Vec<usize>) {
         let atoms: Vec<&Atom> = parts.iter().map(|p| &self.atoms[*p]).collect();
         let of_one: Vec<Variable> =
@@ -239,7 +241,7 @@ impl Grammar {
     }
 }
 
-/// The product of `atoms`, divided by those marked as denominators.
+/// The product of `atoms`. Atoms that are divisors are in the denominator.
 fn product(atoms: &[&Atom]) -> Free {
     let (mut above, mut below) = (Expression::number(1.0), Expression::number(1.0));
     let mut constants = Vec::new();
@@ -257,7 +259,7 @@ fn product(atoms: &[&Atom]) -> Free {
     Free { expression, constants }
 }
 
-/// Increases the parameter indices of `of` by `by`.
+/// Increases the indices of the parameters in `of` by `by`.
 fn renumber(of: &mut Expression, by: usize) {
     match &mut of.node {
         Node::Parameter(k) => *k += by,
@@ -274,7 +276,8 @@ impl Free {
         units::dimension(&self.expression, &plain).ok().flatten()
     }
 
-    /// The formula as a factor of a product, with the values of the constants or `names` in their place.
+    /// The formula as text that can be a factor of a product. `names` replace the values of the constants if they are
+    /// given.
     pub fn text(&self, names: Option<&[String]>) -> String {
         let numbers: Vec<String> = self.constants.iter().map(|c| format!("{c}")).collect();
         let names: Vec<&str> = names.unwrap_or(&numbers).iter().map(String::as_str).collect();

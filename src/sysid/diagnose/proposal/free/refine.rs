@@ -9,16 +9,16 @@ use crate::diagnose::regression::projected::scaled_inverse;
 
 /// Largest number of Gauss–Newton steps.
 const STEPS: usize = 6;
-/// Largest number of trials of a step, which is halved after each failed trial.
+/// Largest number of attempts for a step. The step is halved after each failed attempt.
 const HALVINGS: usize = 4;
 /// Finite-difference step of a constant, as a share of its value.
 const MOVED: f64 = 0.01;
 /// Largest change of a constant in one step, as a share of its value.
 const REACH: f64 = 0.5;
-/// Convergence tolerance: relative increase of the error reduction in a step below which the search ends.
+/// Convergence tolerance: the fit ends if a step increases the reduction of the residual by less than this share.
 const RELATIVE_TOLERANCE: f64 = 1e-4;
 
-/// Data of a channel, and the factor of the form.
+/// Data of a channel, and the factor of a form.
 pub struct Place<'a> {
     /// Whitened data of the channel.
     pub screen: &'a Screen<'a>,
@@ -29,14 +29,15 @@ pub struct Place<'a> {
 }
 
 impl Place<'_> {
-    /// Whitened and projected column of `free`.
+    /// Whitened and projected regressor of the form `free` with `constants`.
     pub fn column(&self, free: &Free, constants: &[f64]) -> DVector<f64> {
         let mut values = self.samples.of(&free.expression, constants);
         values.iter_mut().zip(self.factor).for_each(|(x, f)| *x *= f);
         self.screen.projected(&DVector::from_vec(self.screen.column(values)))
     }
 
-    /// Fits the constants of `free` for the largest reduction of the square of `target`. Returns the form and the reduction.
+    /// Fits the constants of `free` so that its regressor explains as much as possible of `target`. Returns the form
+    /// and the reduction of the sum of squares.
     pub fn refined(&self, free: &Free, target: &DVector<f64>) -> (Free, f64) {
         let mut best = free.constants.clone();
         let mut column = self.column(free, &best);
@@ -65,8 +66,8 @@ impl Place<'_> {
         (Free { expression: free.expression.clone(), constants: best }, fall)
     }
 
-    /// Step of the constants by Kaufman's approximation: the part of the derivatives along the column is projected out. `None` if
-    /// the form has no constants or the step is not finite.
+    /// Gauss–Newton step of the constants with Kaufman's approximation: the derivatives are projected orthogonally to
+    /// the regressor `column`. `None` if the form has no constants or the step is not finite.
     fn step(
         &self,
         free: &Free,
@@ -97,7 +98,7 @@ impl Place<'_> {
     }
 }
 
-/// Reduction of the square of `target` by a projected column.
+/// Reduction of the sum of squares of `target` by a projected regressor.
 fn taken(column: &DVector<f64>, target: &DVector<f64>) -> f64 {
     let fall = column.dot(target).powi(2) / column.norm_squared();
     if fall.is_finite() { fall } else { 0.0 }

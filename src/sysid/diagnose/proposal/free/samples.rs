@@ -1,4 +1,4 @@
-//! Values of the variables of free forms at every sample of the flights, and their averages over windows.
+//! Values of the variables of free forms (expressions of a grammar) at every sample, and their averages over windows.
 
 use crate::diagnose::proposal::free::evaluate::evaluate;
 use crate::diagnose::search::round::Round;
@@ -27,20 +27,21 @@ pub const VARIABLES: [Variable; 13] = [
     Variable::Airspeed,
 ];
 
-/// Samples of all flights, concatenated.
+/// Values of all variables at the samples of all flights, one flight after the other.
 pub struct Samples {
     values: Vec<(Variable, Vec<f64>)>,
     /// Dynamic pressure times wing area, N.
     pressure: Vec<f64>,
-    /// Number of samples; for channels that average over integration steps, the steps' end values follow the samples.
+    /// Number of samples. Moments of a simulated log may be averages over integration steps. For these, the values at
+    /// the ends of the steps follow the samples.
     count: usize,
-    /// First sample of each segment of each flight.
+    /// Index of the first sample of each segment, by flight.
     first: Vec<Vec<usize>>,
     /// Wing span and mean chord, m.
     lengths: [f64; 2],
 }
 
-/// A window: index of its first sample, and the weights of the samples from there on.
+/// A window: index of its first sample, and weights of this sample and the next ones.
 pub struct Average<'a> {
     first: usize,
     weights: &'a [f64],
@@ -68,7 +69,7 @@ fn value(variable: Variable, model: &GreyBox, at: &Instant, z: &Controls) -> f64
 }
 
 impl Samples {
-    /// Samples of the flights of `round` for `channel`.
+    /// Collects the samples of the flights of `round` for forms in `channel`.
     pub fn new(round: &Round, channel: Channel) -> Samples {
         let model = &round.model;
         type Places<'a> = Vec<(&'a Instant, &'a Controls)>;
@@ -102,18 +103,18 @@ impl Samples {
         }
     }
 
-    /// Values of a variable at every sample, SI units; `None` if free forms cannot contain the variable.
+    /// Values of a variable at every sample, in SI units; `None` if free forms cannot contain the variable.
     pub fn variable(&self, variable: Variable) -> Option<&[f64]> {
         self.values.iter().find(|(v, _)| *v == variable).map(|(_, x)| &x[..])
     }
 
-    /// Values of an expression at every sample.
+    /// Values of an expression at every sample, with the values `constants` of its parameters.
     pub fn of(&self, expression: &Expression, constants: &[f64]) -> Vec<f64> {
         evaluate(expression, constants, self.pressure.len(), &|v| self.variable(v))
     }
 
-    /// Factor of a coefficient in `channel` at every sample: dynamic pressure times wing area (N), for moments also times span or
-    /// chord (N m). 1 if the form does not scale with dynamic pressure.
+    /// Factor of a form in `channel` at every sample: dynamic pressure times wing area (N), for moments also times span
+    /// or chord (N m). It is 1 if the form does not scale with dynamic pressure.
     pub fn factor(&self, channel: Channel, of_air: bool) -> Vec<f64> {
         let length = match channel {
             Channel::Roll | Channel::Yaw => self.lengths[0],
@@ -126,7 +127,8 @@ impl Samples {
         }
     }
 
-    /// One value for each sample. For channels that average over integration steps, the value is the mean of a step's ends.
+    /// Reduces `values` to one value for each sample. If the ends of integration steps follow the samples, the value is
+    /// the mean of the start and the end of a step.
     pub fn merged(&self, mut values: Vec<f64>) -> Vec<f64> {
         if values.len() > self.count {
             let (start, end) = values.split_at_mut(self.count);
@@ -136,7 +138,7 @@ impl Samples {
         values
     }
 
-    /// The windows of one cell of `round`, in order.
+    /// The windows of the cell with the index `cell` in `round`, in order.
     pub fn windows<'a>(&self, round: &'a Round, cell: usize) -> Vec<Average<'a>> {
         let cell = &round.cells.list[cell];
         let flight = &round.flights[cell.flight].acting;
@@ -152,8 +154,8 @@ impl Samples {
         cell.windows.iter().map(of).collect()
     }
 
-    /// Means of all variables, then of dynamic pressure times wing area, over each window of flight `flight` of
-    /// `round`.
+    /// Means of all variables, then of dynamic pressure times wing area, over each window of the flight with the index
+    /// `flight`.
     pub fn means(&self, round: &Round, flight: usize) -> Vec<Vec<f64>> {
         let own = &round.flights[flight].acting;
         let of = |window: &Window| {

@@ -1,7 +1,8 @@
-//! Evaluation of all forms on the whitened residual of one channel, in the flights and in null flights.
+//! Evaluation of all forms on the whitened residual of one channel, in the flights and in bootstrap draws under the
+//! null hypothesis that no effect is missing.
 //!
-//! The statistics are those of the library's round ([`Score`](crate::diagnose::regression::rank::Score)), with the model's
-//! coefficients projected out. They contain no correction for noise that columns and residual share. The round applies this
+//! The statistics are those of the library's round ([`Score`](crate::diagnose::regression::rank::Score)), with the
+//! model's coefficients projected out. They contain no errors-in-variables correction. The final ranking applies this
 //! correction to the best forms.
 
 use nalgebra::{DMatrix, DVector};
@@ -17,10 +18,10 @@ use greylag_physics::Channel;
 
 use super::samples::{Average, Samples};
 
-/// Number of the random stream for the null flights.
+/// Number of the random stream for the bootstrap draws.
 const NULLS: u64 = 84;
 
-/// One channel of all flights, prepared for the evaluation of any column.
+/// One channel of all flights, prepared for the evaluation of arbitrary regressors.
 pub struct Screen<'a> {
     round: &'a Round,
     samples: &'a Samples,
@@ -33,48 +34,50 @@ pub struct Screen<'a> {
     roots: DVector<f64>,
     /// Covariance of the nuisance parameters times `known`ᵀ.
     taken: DMatrix<f64>,
-    /// Whitened residual of the tuned model; `noise` is the whitened noise.
+    /// Whitened residual of the re-estimated model. `noise` is the whitened noise.
     residual: DVector<f64>,
     noise: DVector<f64>,
-    /// First and one-past-last row of each block, with the block's number.
+    /// First row, last row + 1 and number of each block.
     blocks: Vec<(usize, usize, usize)>,
     block_count: usize,
-    /// Number of independent rows.
+    /// Number of independent rows of the regression.
     support: f64,
 }
 
-/// Statistics of a projected column.
+/// Statistics of a regressor with the nuisance parameters projected out.
 #[derive(Clone, Debug)]
 pub struct Kept {
-    /// Squared norm of the projected column.
+    /// Squared norm of the projected regressor.
     square: f64,
-    /// Product of the projected column with the residual.
+    /// Product of the projected regressor with the residual.
     linear: f64,
-    /// Part of `square` in the rows of the prior.
+    /// Part of `square` that comes from the prior's pseudo-observations.
     prior: f64,
-    /// Products of the projected column with residual, noise and itself, by block.
+    /// Products of the projected regressor with residual, noise and itself, by block.
     blocks: Vec<[f64; 3]>,
-    /// Change of each nuisance parameter for a unit of the column, in prior standard deviations.
+    /// Regression coefficients of the regressor on the nuisance parameters, divided by their prior standard deviations.
     prior_shift: Vec<f64>,
 }
 
 /// Score of a form.
 #[derive(Clone, Copy, Debug)]
 pub struct Reached {
-    /// Reduction of the squared whitened error.
+    /// Reduction of the whitened residual sum of squares.
     pub fall: f64,
-    /// The smaller of the reduction less (1 + number of constants) ln n and the block-robust Wald statistic.
+    /// Evidence: the smaller of the penalised reduction and the block-robust Wald statistic. The penalty is ln n for
+    /// the coefficient and for each constant, with n independent rows.
     pub evidence: f64,
 }
 
-/// A null flight: the sign of each block's noise, and the errors of the nuisance parameters in prior standard deviations.
+/// A bootstrap draw under the null hypothesis: sign of each block's noise, and errors of the nuisance parameters in
+/// prior standard deviations.
 pub struct Null {
     signs: Vec<f64>,
     prior: DVector<f64>,
 }
 
 impl<'a> Screen<'a> {
-    /// Prepares `channel` of `round`; `None` if no flight measures it.
+    /// Prepares the channel `channel` of `round`; `None` if no flight measures it.
     pub fn new(round: &'a Round, samples: &'a Samples, channel: Channel) -> Option<Screen<'a>> {
         let place = ORDER.iter().position(|c| *c == channel)?;
         let all = &round.cells.list;
@@ -111,7 +114,7 @@ impl<'a> Screen<'a> {
             roots: DVector::from_iterator(na, round.known.iter().map(root)),
             residual: DVector::from_vec(residual),
             noise: DVector::from_vec(noise),
-            // neighbouring windows overlap by half
+            // neighbouring windows overlap by half, so only half of the rows are independent
             support: 0.5 * rows as f64,
             block_count: round.cells.blocks(),
             round,
@@ -122,7 +125,7 @@ impl<'a> Screen<'a> {
         })
     }
 
-    /// The whitened column of `values`, one for each sample.
+    /// The whitened regressor with `values` at the samples, averaged over the windows.
     pub fn column(&self, values: Vec<f64>) -> Vec<f64> {
         let values = self.samples.merged(values);
         let mut rows = Vec::with_capacity(self.residual.len());
@@ -139,7 +142,7 @@ impl<'a> Screen<'a> {
         rows
     }
 
-    /// The statistics of each of `columns`.
+    /// Computes the statistics of each column of `columns`, a matrix of whitened regressors.
     pub fn keep(&self, columns: &DMatrix<f64>) -> Vec<Kept> {
         let taken = &self.taken * columns;
         let left = columns - &self.known * &taken;
@@ -165,20 +168,21 @@ impl<'a> Screen<'a> {
         (0..columns.ncols()).map(one).collect()
     }
 
-    /// `column` less its part along the nuisance parameters, followed by the prior's rows.
+    /// `column` minus the part that the nuisance parameters explain, followed by the rows of the prior's
+    /// pseudo-observations.
     pub fn projected(&self, column: &DVector<f64>) -> DVector<f64> {
         let taken = &self.taken * column;
         stacked(column - &self.known * &taken, -self.roots.component_mul(&taken))
     }
 
-    /// Whitened residual of the tuned model, followed by the rows of the prior.
+    /// Whitened residual of the re-estimated model, followed by the rows of the prior's pseudo-observations.
     pub fn residual(&self) -> DVector<f64> {
         let tuned = self.round.known.iter().zip(self.round.projected.tuned.iter());
         let off = DVector::from_iterator(self.roots.len(), tuned.map(|(k, t)| k.offset - t));
         stacked(self.residual.clone(), self.roots.component_mul(&off))
     }
 
-    /// Null flight number `k`; it depends on `seed` and `k` only.
+    /// Bootstrap draw number `k`. It depends only on `seed` and `k`.
     pub fn null(&self, seed: u64, k: usize) -> Null {
         let mut random = stream(seed, &[NULLS, k as u64]);
         let mut sign = || if random.random::<bool>() { 1.0 } else { -1.0 };
@@ -187,7 +191,8 @@ impl<'a> Screen<'a> {
         Null { signs, prior }
     }
 
-    /// Whitened residual of the tuned model in the null flight `null`, followed by the rows of the prior.
+    /// Whitened residual of the re-estimated model in the draw `null`, followed by the rows of the prior's
+    /// pseudo-observations.
     pub fn residual_of(&self, null: &Null) -> DVector<f64> {
         let mut noise = self.noise.clone();
         for &(from, to, b) in &self.blocks {
@@ -199,13 +204,13 @@ impl<'a> Screen<'a> {
         stacked(noise - &self.known * taken, prior)
     }
 
-    /// Score of a form with `constants` shape constants in the flights.
+    /// Score in the measured flights of a form with `constants` shape constants.
     pub fn measured(&self, kept: &Kept, constants: usize) -> Reached {
         let product = |b: usize| kept.blocks[b][0];
         self.reached(kept, kept.linear, product, constants)
     }
 
-    /// Score of a form with `constants` shape constants in a null flight.
+    /// Score in the draw `null` of a form with `constants` shape constants.
     pub fn by_chance(&self, kept: &Kept, null: &Null, constants: usize) -> Reached {
         let product = |b: usize| null.signs[b] * kept.blocks[b][1];
         let noise: f64 = (0..self.block_count).map(product).sum();
@@ -236,7 +241,8 @@ impl<'a> Screen<'a> {
         }
     }
 
-    /// Penalty for a coefficient and `constants` shape constants. The reduction of the squared error must exceed this penalty.
+    /// Penalty for a coefficient and `constants` shape constants, which the reduction of the residual sum of squares
+    /// must exceed.
     pub fn price(&self, constants: usize) -> f64 {
         (1 + constants) as f64 * self.support.max(2.0).ln()
     }

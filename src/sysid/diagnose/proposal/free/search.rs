@@ -1,4 +1,5 @@
-//! Search over free forms: evaluates a whole grammar, fits the best forms, and finds the best form of each size.
+//! Search over free forms (expressions of a grammar): evaluates the whole grammar, fits the best forms, and finds the
+//! best form of each size.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -23,7 +24,7 @@ const BATCH: usize = 64;
 const REPORT_EVERY: usize = 32;
 /// Number of forms of each size whose constants are fitted.
 const FITTED: usize = 8;
-/// Number of forms of a channel that enter the round.
+/// Number of forms of a channel that take part in the final ranking with the library's forms.
 const FINALISTS: usize = 20;
 /// Significant figures of a fitted constant.
 const FIGURES: usize = 2;
@@ -35,9 +36,9 @@ pub struct Fitted {
     pub form: Form,
     /// Number of nodes of its expression.
     pub size: usize,
-    /// Reduction of the squared whitened error.
+    /// Reduction of the whitened residual sum of squares.
     pub fall: f64,
-    /// The reduction less the penalties for its constants and for the number of forms of its size.
+    /// The reduction minus the penalties for its constants and for the number of forms of its size.
     pub worth: f64,
     /// The smaller of the penalised reduction and the block-robust Wald statistic.
     pub evidence: f64,
@@ -47,15 +48,15 @@ pub struct Fitted {
 pub struct Searched {
     /// Number of forms evaluated.
     pub tried: usize,
-    /// Evidence that the same search reaches in null flights.
+    /// Critical value of the evidence, from the same search on bootstrap draws under the null hypothesis.
     pub threshold: f64,
     /// The best form of each size, if it reduces the error more than all smaller forms.
     pub front: Vec<Fitted>,
-    /// Forms that enter the round, in descending order of `worth`.
+    /// Forms that take part in the final ranking, in descending order of `worth`.
     pub finalists: Vec<Fitted>,
 }
 
-/// The forms that scale with dynamic pressure, or the forms that do not.
+/// Either all forms that scale with dynamic pressure, or all other forms.
 struct Side {
     of_air: bool,
     grammar: Grammar,
@@ -63,7 +64,7 @@ struct Side {
     kept: Vec<Kept>,
 }
 
-/// Searches the free forms in `channel` of the residual of `round`. `None` if no flight measures the channel.
+/// Searches the free forms for `channel` in the residual of `round`. `None` if no flight measures the channel.
 ///
 /// # Errors
 /// `progress` cancelled.
@@ -108,7 +109,7 @@ pub fn searched(
     }))
 }
 
-/// The `variables` that can be computed, with their ranges in the flights.
+/// The variables of `variables` that can be computed, with quantiles of their magnitude in the flights.
 fn reaches(samples: &Samples, variables: &[Variable]) -> Vec<Reach> {
     let of = |variable: &Variable| {
         let all = samples.variable(*variable)?;
@@ -126,7 +127,7 @@ fn rounded(x: f64) -> f64 {
 }
 
 impl Side {
-    /// Evaluates all forms; `on_progress` receives the number of forms that are done.
+    /// Evaluates all forms. `on_progress` receives the number of forms that are done.
     fn keep(
         &mut self,
         screen: &Screen,
@@ -181,13 +182,13 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Penalty of a form of `size` nodes with `constants`. It covers the form's coefficients, and the choice among all forms of
-    /// this size.
+    /// Penalty of a form of `size` nodes with `constants` shape constants. It covers the coefficients of the form, and
+    /// its selection among all forms of this size.
     fn price(&self, size: usize, constants: usize) -> f64 {
         self.screen.price(constants) + 2.0 * (self.counts[size].max(1) as f64).ln()
     }
 
-    /// The best forms of each size in the flights, with fitted constants.
+    /// The best forms of each size in the measured flights, with fitted constants.
     fn fitted(&self, sides: &[Side]) -> Vec<Fitted> {
         let mut best: Vec<(usize, usize, f64)> = Vec::new();
         for size in 1..=MOST_NODES {
@@ -216,7 +217,7 @@ impl Search<'_> {
         fitted
     }
 
-    /// `free` with its score; `None` if an effect file cannot represent the form.
+    /// Computes the score of `free`. `None` if an effect file cannot represent the form.
     fn judged(&self, side: &Side, free: Free) -> Option<Fitted> {
         let mut values = self.samples.of(&free.expression, &free.constants);
         values.iter_mut().zip(&side.factor).for_each(|(x, f)| *x *= f);
@@ -232,7 +233,8 @@ impl Search<'_> {
         Some(Fitted { form, size, fall: reached.fall, worth, evidence: reached.evidence })
     }
 
-    /// Best evidence of the search in each null flight. The constants of the best form are fitted as in the measured flights.
+    /// Best evidence of the search in each bootstrap draw under the null hypothesis. The constants of the best form are
+    /// fitted as in the measured flights.
     fn nulls(&self, sides: &[Side], options: &Options) -> Vec<f64> {
         let of = |k: usize| {
             let null = self.screen.null(options.seed, k);
@@ -254,7 +256,7 @@ impl Search<'_> {
                 let (_, fall) = side.place(self).refined(&free, &target);
                 fall - self.screen.price(candidate.constants) - most
             });
-            // the fit may increase the best evidence as much as the best gain
+            // fitting the constants may increase the best evidence as much as the best penalised reduction
             evidence + fitted.max(0.0)
         };
         (0..options.nulls).into_par_iter().map(of).collect()

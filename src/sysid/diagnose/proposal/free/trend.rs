@@ -6,7 +6,7 @@ use greylag_physics::formula::Variable;
 use greylag_physics::formula::expression::Expression;
 use greylag_physics::formula::parser;
 
-/// Values of a variable at which a shape is sampled, as shares of its range.
+/// Values of a variable at which a shape is sampled, as shares of the variable's range.
 const ALONG: [f64; 8] = [0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0];
 /// Constant values of the other variables, as shares of their ranges.
 const BESIDE: [f64; 3] = [0.9, 0.37, 0.71];
@@ -38,7 +38,8 @@ pub fn plain(v: Variable) -> &'static str {
     }
 }
 
-/// Typical range of the variable in flight: `FLOWN` times its largest possible value, or this value for a positive variable.
+/// Typical largest value of the variable in flight. A positive variable may reach its largest possible value, other
+/// variables `FLOWN` times this value.
 fn reach(v: Variable) -> f64 {
     if positive(v) { v.range()[1] } else { FLOWN * v.range()[1] }
 }

@@ -1,4 +1,5 @@
-//! Nuisance parameters of every round: the free coefficients and the sensor errors, with their columns.
+//! Nuisance parameters of a round, with their regressors: free coefficients of the model, constants of each flight,
+//! sensor errors.
 
 use super::Problem;
 use crate::diagnose::regression::catalogue::{self, Entry};
@@ -9,10 +10,12 @@ use crate::diagnose::regression::projected::{Known, Projected};
 use crate::diagnose::regression::{per_flight, sensors};
 use greylag_model::GreyBox;
 
+/// Nuisance parameters, indices of the free coefficients among those of the model, and columns by flight.
 type KnownColumns = (Vec<Known>, Vec<usize>, Vec<Placed>);
 
-/// The nuisance parameters and their columns: the free coefficients, then the constants of all flights, then the sensor
-/// errors of all flights. `linear_columns` holds the columns of the coefficients in which the model is linear.
+/// Returns the nuisance parameters and their columns. The free coefficients come first, then the constants of all
+/// flights, then the sensor errors of all flights. `linear_columns` holds, by flight, the columns of the coefficients
+/// in which the model is linear.
 pub(super) fn known(
     problem: &Problem,
     model: &GreyBox,
@@ -23,7 +26,7 @@ pub(super) fn known(
     let mut placed: Vec<Placed> = vec![Vec::new(); flights.len()];
     let linear = model.linear();
     for (index, named) in model.coefficients().iter().enumerate() {
-        // the prior of a shape constant that has joined is as wide as its linearisation reaches
+        // a nonlinear coefficient of an added effect has a prior as wide as the reach of its linearisation
         let joined =
             if linear[index] { f64::INFINITY } else { catalogue::REACH * named.value.abs() };
         let (value, width) = problem.prior.get(index).copied().unwrap_or((named.value, joined));
@@ -63,9 +66,9 @@ pub(super) fn known(
     (known, coefficients, placed)
 }
 
-/// Sets the prior mean of every flight's blur to the second-order effect of its delay: a record of u that is late by
-/// λ samples is u − λu' + ½λ²u'', and the delay's column contains the first order alone. Without the second order, a
-/// delay of a sample leaves a curvature that would be attributed to a lag.
+/// Corrects the prior of each flight's actuator averaging ("blur") for the second-order effect of the estimated delay.
+/// A record of u with a delay of λ samples is u − λu' + ½λ²u''. The regressor of the delay contains only the
+/// first-order term. Without the second-order term, a delay of one sample would be mistaken for an actuator lag.
 pub(super) fn curved(problem: &Problem, known: &mut [Known], projected: &Projected) {
     let first = known.len().saturating_sub(problem.flights.len() * SENSORS);
     for (k, flight) in problem.flights.iter().enumerate() {
@@ -79,7 +82,8 @@ pub(super) fn curved(problem: &Problem, known: &mut [Known], projected: &Project
     }
 }
 
-/// Whether a search estimates the coefficient. Gains with the nominal value 1 are fixed.
+/// Whether the coefficient with the index `index` is estimated. A linear coefficient that is 1 in all starting points
+/// of its effect is fixed.
 fn searched(model: &GreyBox, index: usize) -> bool {
     let name = &model.coefficients()[index].name;
     let Some((id, own)) = name.split_once('.') else { return true };
@@ -89,7 +93,8 @@ fn searched(model: &GreyBox, index: usize) -> bool {
     starts == 0 || catalogue::free(&entry).iter().any(|k| about.coefficients[*k].name == own)
 }
 
-/// Derivative of the prediction with respect to a coefficient in which the model is nonlinear.
+/// Derivative of the predicted forces and moments with respect to a coefficient in which the model is nonlinear, by
+/// finite differences.
 fn tangent(model: &GreyBox, flight: &Ready, index: usize) -> Column {
     let named = &model.coefficients()[index];
     let by = (0.02 * named.value.abs()).max(1e-4);
@@ -113,7 +118,7 @@ fn tangent(model: &GreyBox, flight: &Ready, index: usize) -> Column {
             .collect();
         combine(&flight.linear(model, first..last), &values)
     };
-    // lags, delays and dead zones are not negative
+    // the step down must not make a lag, a delay or a dead zone negative
     let down = by.min(named.value.max(0.0));
     combine(&[of(&moved(by)), of(&moved(-down))], &[1.0 / (by + down), -1.0 / (by + down)])
 }

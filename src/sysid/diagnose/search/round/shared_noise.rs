@@ -1,4 +1,5 @@
-//! Spurious products from noise that columns and residual share, estimated with simulated noise.
+//! Errors-in-variables bias: products of regressors and residual that are due to common noise. Simulated noise
+//! determines them.
 
 use crate::diagnose::regression::shared;
 use rayon::prelude::*;
@@ -11,11 +12,11 @@ use crate::diagnose::regression::columns::Ready;
 use crate::diagnose::regression::noise::Noise;
 use greylag_model::GreyBox;
 
-/// Number of draws over which the product of shared noise is averaged. With a single draw, a non-existent inertia error
-/// reached an evidence of 3, 11 or 19, depending on the seed.
+/// Number of noise draws over which the bias is averaged. With a single draw, the evidence for an inertia error that
+/// did not exist was 3, 11 or 19, depending on the seed.
 const DRAWS: usize = 8;
 
-/// Inputs of a round.
+/// Data, model and candidates of a round.
 pub(super) struct Setting<'a> {
     pub(super) problem: &'a Problem,
     pub(super) model: &'a GreyBox,
@@ -29,7 +30,7 @@ pub(super) fn sum(lists: &[Vec<f64>]) -> Vec<f64> {
     (0..count).map(|k| lists.iter().map(|list| list[k]).sum()).collect()
 }
 
-/// The flights with additional simulated noise of draw number `draw`.
+/// The flights with added simulated noise, evaluated under the model. `draw` is the number of the draw.
 pub(super) fn disturbed(of: &Setting, draw: usize) -> Vec<Ready> {
     let flights = of.problem.flights.par_iter().zip(&of.problem.path).enumerate();
     flights
@@ -40,10 +41,12 @@ pub(super) fn disturbed(of: &Setting, draw: usize) -> Vec<Ready> {
         .collect()
 }
 
-/// Spurious products from shared noise, by flight and column, for the nuisance parameters and then the linear candidates.
+/// Bias of the products of columns and residual due to common noise, by flight and index of the column. The columns are
+/// those of the nuisance parameters and the linear candidates.
 ///
-/// The products are means of `DRAWS` draws if there are candidates, else of one draw. Also returns the columns with the noise
-/// of the first draw.
+/// `before` holds the columns without added noise, with the residual at the index `last`. The bias is the mean of
+/// `DRAWS` draws; without candidates, a single draw suffices. Also returns the columns with the noise of the first
+/// draw.
 pub(super) fn shared(
     of: &Setting,
     cells: &Cells,
@@ -56,7 +59,7 @@ pub(super) fn shared(
     let everything = catalogue::with_all(of.model, &straight).0;
     let drawn = |draw: usize| {
         let flights = disturbed(of, draw);
-        // columns of the model and of the candidates in one pass
+        // one pass computes the columns of the model and of the candidates
         let all = |flight: &Ready| {
             let mut own = flight.linear(&everything, 0..everything.coefficients().len());
             let candidates = own.split_off(of.model.coefficients().len());
@@ -66,7 +69,7 @@ pub(super) fn shared(
         let (known, _, mut after) = known(of.problem, of.model, &flights, columns);
         let made = Columns { trials: Vec::new(), columns: candidates };
         let end = place(&mut after, known.len(), &made, &flights);
-        // the residual keeps its index in `before`
+        // the residual gets the index that it has in `before`
         for list in &mut after {
             list.iter_mut().filter(|(p, _)| *p == end).for_each(|(p, _)| *p = last);
         }

@@ -1,4 +1,4 @@
-//! Models, residuals and contributions that follow from the fit of a round.
+//! Models, residuals and contributions of effects, as computed from the fit of a round.
 
 use super::Round;
 use crate::diagnose::regression::catalogue::{self};
@@ -9,7 +9,8 @@ use crate::diagnose::regression::rank::Score;
 use greylag_model::GreyBox;
 
 impl Round {
-    /// The model with its coefficients as estimated together with the effect of `score`. The effect is not added.
+    /// The model with the coefficients from a joint fit with the effect of `score`. The effect itself is not added to
+    /// the model.
     pub fn with(&self, score: &Score) -> GreyBox {
         let p = &self.projected;
         let mut model = self.model.clone();
@@ -22,14 +23,15 @@ impl Round {
         model
     }
 
-    /// Largest change of a coefficient by tuning, in standard deviations of the coefficient.
+    /// Largest change of a coefficient in the fit, in standard deviations of the coefficient. It is small after
+    /// convergence.
     pub fn stride(&self) -> f64 {
         let p = &self.projected;
         let of = |k: usize| p.tuned[k].abs() / p.covariance[(k, k)].sqrt();
         (0..self.coefficients.len()).map(of).filter(|x| x.is_finite()).fold(0.0, f64::max)
     }
 
-    /// Residual of the tuned model without sensor errors, by flight.
+    /// Residual of forces (N) and moments (N m) by flight, after the fit of the model and the sensor errors.
     pub fn tuned_residual(&self) -> Vec<Column> {
         let na = self.known.len();
         let of = |placed: &Placed| {
@@ -48,7 +50,7 @@ impl Round {
         self.placed.iter().map(of).collect()
     }
 
-    /// Contribution of `score` to the residual, by flight.
+    /// Fitted contribution of the effect of `score` to forces (N) and moments (N m), by flight.
     pub fn contribution(&self, score: &Score) -> Vec<Column> {
         let na = self.known.len();
         let of = |placed: &Placed| {
@@ -65,7 +67,8 @@ impl Round {
         self.placed.iter().map(of).collect()
     }
 
-    /// Residual with the effect of `score` and the nuisance parameters from the joint estimate, by flight.
+    /// Residual of forces (N) and moments (N m) by flight, after a joint fit of the effect of `score` and the nuisance
+    /// parameters.
     pub fn residual_with(&self, score: &Score) -> Vec<Column> {
         let added = self.contribution(score);
         let given = |place: usize| -> f64 {
@@ -84,7 +87,7 @@ impl Round {
         self.tuned_residual().into_iter().zip(added).zip(&self.placed).map(of).collect()
     }
 
-    /// Reduction of the squared whitened error by `score`, by channel.
+    /// Reduction of the whitened residual sum of squares by the effect of `score`, by channel.
     pub fn taken_by(&self, score: &Score) -> [f64; 6] {
         let mut taken = [0.0; 6];
         let last = self.projected.width();
@@ -97,8 +100,8 @@ impl Round {
         taken
     }
 
-    /// Channels in which `score` reduces the error by more than a tenth of its largest reduction, in descending order of the
-    /// reduction.
+    /// Indices of the channels in which the effect of `score` reduces the residual sum of squares most, in descending
+    /// order. Channels with less than a tenth of the largest reduction are left out.
     pub fn channels_of(&self, score: &Score) -> Vec<usize> {
         let taken = self.taken_by(score);
         let most = taken.iter().fold(0.0_f64, |a, b| a.max(*b));
@@ -108,8 +111,8 @@ impl Round {
         channels
     }
 
-    /// The model with its coefficients as estimated from data and prior. Coefficients of asserted effects are limited to their
-    /// bounds, and changes of mass and inertia to physically possible bodies.
+    /// The model with coefficients estimated from data and prior. Coefficients of added effects stay within their
+    /// bounds. Changes of mass and inertia are reduced until the body is physically possible.
     pub fn tuned(&self) -> GreyBox {
         let mut model = self.model.clone();
         let linear = model.linear();

@@ -1,4 +1,4 @@
-//! Checks of the best candidate.
+//! Checks of the best candidate before it is added to the model.
 
 use super::found::{Found, Selected};
 use crate::diagnose::options::Options;
@@ -7,21 +7,23 @@ use crate::diagnose::search::checks;
 use crate::diagnose::search::round::Round;
 use crate::diagnose::search::unexplained::explained;
 
-/// Least relative reduction of the error on held-out segments.
+/// Smallest share of the residual beyond noise that an effect must remove from held-out blocks.
 pub const HELD_OUT: f64 = 0.1;
-/// Least share of bootstraps in which the effect, or one indistinguishable from it, is best.
+/// Smallest share of block bootstraps in which the effect, or an effect that is indistinguishable from it, must rank
+/// first.
 pub const SELECTED: f64 = 0.8;
-/// Precision of the formula of a nonlinear effect: a later effect with a smaller share of its reduction may only
-/// correct the formula's error.
+/// Relative precision of the formula of a nonlinear effect. An effect selected later may merely correct the error of
+/// this formula if its reduction of the residual is below this share of the nonlinear effect's reduction.
 const PRECISION: f64 = 2e-3;
-/// Least share of a channel's variance that a material effect explains. A delay of 10 ms explains 2e-4 of it.
+/// Smallest share of a channel's variance that an effect must explain to be asserted. A delay of 10 ms explains 2e-4.
 const MATERIAL: f64 = 1e-4;
-/// Least share of a channel's error beyond noise that a material effect removes beside others.
+/// Smallest share of a channel's residual beyond noise that an effect must remove to be asserted.
 const MATERIAL_BESIDE: f64 = 0.02;
-/// Correlation of contributions from which one candidate can replace another.
+/// Two candidates can replace each other if the correlation of their contributions exceeds this magnitude.
 const RIVAL: f64 = 0.3;
 
-/// The best candidate with all its checks, if its evidence exceeds the threshold.
+/// Returns the best candidate with the results of all checks. `None` if its evidence does not exceed the critical
+/// value.
 pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
     let round = found.round();
     let (place, score) = found.scores.first()?;
@@ -42,7 +44,7 @@ pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
     if slight {
         refused.push(under("it takes", heldout, "of the error on held-out segments", HELD_OUT));
     }
-    // a candidate that explains another part of the residual would be selected in addition, not instead
+    // an uncorrelated candidate explains another part of the residual, so it does not compete with the best candidate
     let rival = |(t, other): &&(usize, Score)| {
         !found.beaten.contains(t) && checks::correlation(round, score, other).abs() > RIVAL
     };
@@ -51,7 +53,7 @@ pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
     if selected < SELECTED && options.bootstraps > 0 {
         refused.push(under("it is the best in", selected, "of the block bootstraps", SELECTED));
     }
-    // a candidate that absorbs prior misfit does not correct the error of a formula
+    // a candidate that merely replaces changes of coefficients does not correct the error of a formula
     refused.extend(hidden(found, score).filter(|_| !absorbs_prior_error));
     let by_flight = checks::by_flight(round, trial, score);
     let (first, of_first) = &by_flight[0];
@@ -83,21 +85,23 @@ pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
     })
 }
 
-/// Indices in the ranking of the candidates that the data cannot distinguish from the best one.
+/// Indices in the ranking of the candidates that the data cannot distinguish from the best candidate.
 fn class(found: &Found) -> Vec<usize> {
     let mut class = checks::class(found.round(), &found.scores, 0);
     class.retain(|k| !found.beaten.contains(&found.scores[*k].0));
-    // candidates that were as good in the run-off belong to the class, whatever their scores before tuning
+    // the class also contains the candidates that fitted equally well when they were added to the model
     let level = (1..found.scores.len()).filter(|k| found.level.contains(&found.scores[*k].0));
     let level: Vec<usize> = level.filter(|k| !class.contains(k)).collect();
     class.extend(level);
     class
 }
 
-/// A remark if a significant effect is immaterial: in no channel does it explain [`MATERIAL`] of the variance and
-/// [`MATERIAL_BESIDE`] of the tuned model's residual beyond noise. The measure is the reduction with the effect and
-/// all coefficients re-estimated, because the evidence also includes reductions of the prior's misfit and of column
-/// noise, which no channel shows.
+/// Returns a remark if a significant effect is too small to be asserted: no channel reaches both [`MATERIAL`] and
+/// [`MATERIAL_BESIDE`].
+///
+/// The reduction of the residual is computed from a joint estimate of the effect and all coefficients. The evidence
+/// would be too large a measure: it also counts deviations from the prior and noise in the regressors, which no channel
+/// shows.
 fn immaterial(found: &Found, round: &Round, score: &Score) -> Option<String> {
     let taken = round.taken_by(score);
     let explained = explained(&found.first, &round.tuned_residual(), &round.residual_with(score));
@@ -123,7 +127,7 @@ fn immaterial(found: &Found, round: &Round, score: &Score) -> Option<String> {
     })
 }
 
-/// Text of a refusal because a share is below its limit or, if NaN, cannot be computed.
+/// Text of a refusal. The share is below the limit `least` or, if it is NaN, cannot be computed.
 fn under(verb: &str, share: f64, of: &str, least: f64) -> String {
     match share.is_nan() {
         true => format!("the share that {verb} {of} cannot be computed"),
@@ -131,7 +135,8 @@ fn under(verb: &str, share: f64, of: &str, least: f64) -> String {
     }
 }
 
-/// A remark if `score` may only correct the formula of an effect selected before.
+/// Returns the reason for a refusal if the effect of `score` may merely correct the formula of an effect selected
+/// earlier.
 fn hidden(found: &Found, score: &Score) -> Option<String> {
     let earlier = found.selected.iter().find(|s| s.curved && hides(s, score))?;
     Some(format!(
@@ -141,7 +146,7 @@ fn hidden(found: &Found, score: &Score) -> Option<String> {
     ))
 }
 
-/// Whether `score` may only correct the formula of the effect `earlier`.
+/// Whether the effect of `score` may merely correct the formula of the effect `earlier`.
 fn hides(earlier: &Selected, score: &Score) -> bool {
     score.fall < PRECISION * earlier.score.fall
 }

@@ -1,4 +1,4 @@
-//! Result of the search: the selected effects, their reductions, the remaining residual.
+//! Result of the search: the selected effects with their checks, and the remaining residual.
 
 use crate::diagnose::regression::gather::Column;
 use crate::diagnose::regression::rank::Score;
@@ -8,76 +8,78 @@ use crate::diagnose::search::round::Round;
 use crate::diagnose::search::shape::Shape;
 use crate::diagnose::search::unexplained::unexplained;
 
-/// A channel is adequate if its unexplained share is below this. Errors of reconstruction and sampling cause such
-/// shares even with an exact model.
+/// The model is adequate in a channel if it leaves less than this share of the variance unexplained. Errors of
+/// reconstruction and sampling leave shares up to this size even with an exact model.
 const ADEQUATE: f64 = 5e-4;
 
-/// Candidate selected by a round, with its checks.
+/// Candidate effect that was best in a round, with the results of its checks.
 #[derive(Clone, Debug)]
 pub struct Selected {
     /// Identifier of the effect.
     pub id: &'static str,
     /// Score in the round that selected the effect.
     pub score: Score,
-    /// Threshold of evidence in the same round.
+    /// Critical value of the evidence in the same round.
     pub threshold: f64,
     /// Ids of effects that the data cannot distinguish from this effect.
     pub class: Vec<String>,
-    /// Relative reduction of the error on held-out segments.
+    /// Share of the residual beyond noise that the effect removes from held-out blocks; NaN if it cannot be computed.
     pub heldout: f64,
-    /// Share of bootstraps in which the effect, or one of `class`, ranks first.
+    /// Share of block bootstraps in which the effect, or an effect of `class`, ranks first.
     pub selected: f64,
-    /// For each free coefficient its index, and its estimate from each flight with its standard deviation.
+    /// Estimates from each flight alone. For each free coefficient: its index, then estimate and standard deviation by
+    /// flight.
     pub by_flight: Vec<(usize, Vec<[f64; 2]>)>,
-    /// Channels it acts in, the largest reduction first.
+    /// Indices of the channels in which the effect reduces the residual most, in descending order of the reduction.
     pub channels: Vec<usize>,
-    /// Reduction of the squared whitened error, by channel.
+    /// Reduction of the whitened residual sum of squares, by channel.
     pub taken: [f64; 6],
-    /// Reasons not to assert it; empty if it is asserted.
+    /// Reasons not to assert the effect; empty if it is asserted.
     pub refused: Vec<String>,
-    /// Whether its reduction is too small to matter, whatever the other checks show.
+    /// Whether the effect removes too little of the residual from held-out blocks.
     pub slight: bool,
-    /// Remark if it is significant but not material.
+    /// Remark if the effect is significant but too small to be asserted.
     pub trace: Option<String>,
-    /// Whether it mostly replaces an adjustment of existing coefficients, so that the remaining residual is no
-    /// argument against it.
+    /// Whether the effect merely replaces changes of existing coefficients. A remaining residual then does not count
+    /// against it.
     pub absorbs_prior_error: bool,
-    /// Whether it is nonlinear in its constants.
+    /// Whether the effect is nonlinear in a coefficient.
     pub curved: bool,
-    /// Fitted contribution to the residual, by flight.
+    /// Fitted contribution to forces (N) and moments (N m), by flight.
     pub contribution: Vec<Column>,
 }
 
 /// Result of the search.
 pub struct Found {
-    /// The first round: the model tuned, without added effects.
+    /// The first round: the re-estimated model without added effects.
     pub first: Round,
-    /// Unexplained share of each channel's variance beyond noise in the first round.
+    /// Unexplained share of each channel's variance beyond noise in the first round; NaN if the channel is not
+    /// measured.
     pub unexplained: [f64; 6],
-    /// Error that a flexible model could remove from the residual of the first round.
+    /// Part of the first round's residual that a flexible model could remove.
     pub first_remainder: Remainder,
-    /// The last round, with every asserted effect in the model; `None` if it is the first one.
+    /// The last round, whose model contains all added effects; `None` if no effect was added.
     pub last: Option<Round>,
-    /// Error that a flexible model could remove from the residual of the last round.
+    /// Part of the last round's residual that a flexible model could remove.
     pub remainder: Remainder,
-    /// Error beyond noise of the last round's model; `None` if that is the first one.
+    /// Residual beyond noise of the last round's model; `None` if no effect was added.
     pub beyond: Option<checks::Beyond>,
-    /// Reduction of the last round's residual by products of the states; `None` if they cannot be fitted.
+    /// Reduction of the last round's residual by products of states and deflections; `None` if they cannot be fitted.
     pub shape: Option<Shape>,
-    /// Candidates' scores in the last round.
+    /// Indices and scores of the candidates in the last round, the best first.
     pub scores: Vec<(usize, Score)>,
-    /// Best evidence in each null flight of the first round.
+    /// Evidence of the best candidate in each bootstrap draw under the null hypothesis, in the first round.
     pub nulls: Vec<f64>,
-    /// Threshold of evidence in the last round.
+    /// Critical value of the evidence in the last round.
     pub threshold: f64,
-    /// Indices of the trials that were worse than the best one after both had been tuned.
+    /// Indices of the candidates that fitted clearly worse than the best one when each was added to the model.
     pub beaten: Vec<usize>,
-    /// Indices of the trials that were as good as the best one after both had been tuned.
+    /// Indices of the candidates that fitted as well as the best one when each was added to the model.
     pub level: Vec<usize>,
     /// Asserted effects in the order of selection, then the refused ones.
     pub selected: Vec<Selected>,
-    /// Standard deviation of each coefficient of the last round's model due to discretisation; empty if nothing was
-    /// selected.
+    /// Standard deviation of each coefficient of the last round's model due to discretisation; empty if no effect was
+    /// added.
     pub sums: Vec<f64>,
 }
 
@@ -87,7 +89,8 @@ impl Found {
         self.last.as_ref().unwrap_or(&self.first)
     }
 
-    /// Whether the residual correlates significantly with products of states in a channel where it matters.
+    /// Whether products of states and deflections explain a significant part of the residual in a channel that is not
+    /// adequate.
     pub fn has_shape(&self) -> bool {
         let left = self.left();
         let in_channel = |shape: &Shape, c: usize| left[c] >= ADEQUATE && shape.term(c).is_some();
@@ -99,12 +102,13 @@ impl Found {
         unexplained(&self.first, &self.round().tuned_residual())
     }
 
-    /// Whether a channel is not adequate in the last round.
+    /// Whether the model of the last round is not adequate in some channel.
     pub fn leaves_something(&self) -> bool {
         self.left().iter().any(|share| *share >= ADEQUATE)
     }
 
-    /// Share of the tuned model's squared error beyond noise that a flexible model could still remove.
+    /// Share of the residual beyond noise, as it was in the first round, that a flexible model could still remove after
+    /// the last round.
     pub fn learnable(&self) -> f64 {
         let excess = checks::excess(&self.first, &[true; 6]);
         self.remainder.total / excess.max(self.remainder.total).max(1.0)

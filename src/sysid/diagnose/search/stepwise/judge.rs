@@ -1,21 +1,22 @@
-//! Refusals of selected effects because of the remaining residual.
+//! Refusal of selected effects, mainly because too much of the residual remains in their channels.
 
 use super::found::{Found, Selected};
 use crate::compare::ChannelId;
 use greylag_physics::inputs::{Acts, Kind};
 
-/// Share of the removable error that an effect may leave in its channels.
+/// Largest share of the residual that an effect may leave in its channels.
 const LEFT: f64 = 0.3;
-/// The same share for products of the states; with right effects it is below 0.02, except for `unsteady_lift`, whose
-/// formula differs from the simulator's.
+/// Products of states must explain less than this share of what the products and the effects explain together. With
+/// correct effects, the share is below 0.02. An exception is `unsteady_lift`, whose formula differs from the
+/// simulator's.
 const SHAPELESS: f64 = 0.1;
-/// The same share for second derivatives of the deflections beside an input effect.
+/// Limit of the same share for second derivatives of the deflections, if the effect acts on the deflections.
 const BENT: f64 = 0.02;
 
 impl Found {
-    /// Refuses effects that leave too large a share of the error in their own channels: of the error that a flexible
-    /// model could remove, of the error beyond noise, or of the missing part that products of states or second
-    /// derivatives of the deflections explain.
+    /// Refuses effects that leave too much of the residual in their own channels. Three parts of the residual are
+    /// checked: the part that a flexible model could remove, the part beyond noise, and the part that products of
+    /// states or second derivatives of the deflections explain.
     pub(super) fn judge_remainder(&mut self) {
         let (before, after) = (&self.first_remainder, &self.remainder);
         let real = |s: &&Selected| s.refused.is_empty() && !s.absorbs_prior_error;
@@ -44,7 +45,7 @@ impl Found {
                 ));
             }
             let Some(shape) = &self.shape else { continue };
-            // the residual of a channel with several effects is common to them
+            // effects in the same channel share its residual, so their reductions are added
             let others = taken.iter().filter(|(id, _)| *id != effect.id);
             let others: f64 =
                 others.map(|(_, of)| effect.channels.iter().map(|c| of[*c]).sum::<f64>()).sum();
@@ -70,7 +71,8 @@ impl Found {
         self.refuse_companions();
     }
 
-    /// Refuses every effect that acts in one of `channels`, for `reason`. The effect `except` is spared.
+    /// Refuses every effect that acts in one of `channels`, with the reason `reason`. The effect `except` is not
+    /// refused.
     pub fn refuse_in(&mut self, channels: &[ChannelId], except: &str, reason: &str) {
         let touched = |c: &usize| channels.contains(&ChannelId::ALL[*c]);
         let spared = |s: &&mut Selected| s.id != except && s.channels.iter().any(touched);
@@ -80,8 +82,8 @@ impl Found {
         self.refuse_companions();
     }
 
-    /// Refuses effects that act only in channels in which the flights cannot assess the model. `abstained` holds the
-    /// reason for each of these channels.
+    /// Refuses an effect if the flights cannot assess the model in any of its channels. `abstained` holds the reason
+    /// for each channel that cannot be assessed, and `None` for the others.
     pub fn refuse_where_abstained(&mut self, abstained: &[Option<String>; 6]) {
         for effect in self.selected.iter_mut().filter(|s| s.refused.is_empty()) {
             let whys: Option<Vec<&String>> =
@@ -92,19 +94,20 @@ impl Found {
         }
     }
 
-    /// Refuses every effect for `reason`.
+    /// Refuses all selected effects with the reason `reason`.
     pub fn refuse_all(&mut self, reason: &str) {
         self.selected.iter_mut().for_each(|effect| effect.refused.push(reason.to_owned()));
     }
 
-    /// Refuses the selected effects with the ids `ids`, for `reason`.
+    /// Refuses those selected effects whose ids are in `ids`, with the reason `reason`.
     pub fn refuse(&mut self, ids: &[String], reason: &str) {
         for effect in self.selected.iter_mut().filter(|s| ids.iter().any(|id| id == s.id)) {
             effect.refused.push(reason.to_owned());
         }
     }
 
-    /// Refuses effects that were selected after a refused one, since they depend on it.
+    /// Refuses the effects that were selected after a refused effect, because they were found with that effect in the
+    /// model. An effect that was refused only as too small does not count.
     fn refuse_companions(&mut self) {
         let refused = |s: &Selected| !s.refused.is_empty() && s.trace.is_none();
         let Some(first) = self.selected.iter().position(refused) else { return };

@@ -1,4 +1,5 @@
-//! Comparison of candidate effects with similar evidence: each is added to the model, and the model is tuned.
+//! Comparison of candidate effects with similar scores. Each is added to the model in turn, and all coefficients are
+//! re-estimated.
 
 use super::found::Found;
 use crate::diagnose::search::checks;
@@ -12,11 +13,11 @@ const CONTENDING_CORRELATION: f64 = 0.6;
 /// Largest number of contenders, the best candidate included.
 const CONTENDERS: usize = 4;
 
-/// Decides between close contenders: each contender is added to the model, and the model is tuned with the same noise. The
-/// linearisation about the model without them cannot distinguish the contenders.
+/// Compares the contenders. Each is added to the model in turn, and all coefficients are re-estimated with the same
+/// noise. The linearisation about the model without the contenders cannot distinguish them.
 ///
-/// The best contender is ranked first. The others are recorded as clearly worse or as equally good. `None` if there is
-/// nothing to decide.
+/// The best contender moves to the first place of the ranking. The others are recorded as clearly worse or as equally
+/// good. Returns `None` if there are fewer than two contenders.
 pub(super) fn run_off(problem: &Problem, found: &mut Found) -> Option<()> {
     let round = found.last.as_ref().unwrap_or(&found.first);
     let (_, best) = found.scores.first()?;
