@@ -20,7 +20,7 @@ use greylag::sysid::amend::{Options, amend};
 use greylag::sysid::compare::arx::{self, Arx, Choice};
 use greylag::sysid::compare::{HorizonScore, forecast, scores};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
-use greylag::sysid::per_flight::PerFlight;
+use greylag::sysid::per_flight::{PerFlight, SensorErrors};
 use greylag::sysid::progress::ignore_progress;
 use greylag::sysid::weak_form::prepared::Prepared;
 
@@ -160,13 +160,16 @@ fn parts(fit: &[Reconstruction]) -> Vec<Reconstruction> {
 }
 
 /// The structures of a fit that are tried, with their names.
-fn structures() -> [Structure; 4] {
+fn structures() -> [Structure; 5] {
     let of = |per_flight: PerFlight| Fitted::Coefficients { effects: Vec::new(), per_flight };
-    let axes = PerFlight { askew_deg: Some(3.0), ..PerFlight::default() };
-    let trims = PerFlight { trims: Some(1.0), ..PerFlight::default() };
+    let tuned = PerFlight { sensors: SensorErrors::Dropped, ..PerFlight::default() };
+    let sensors = PerFlight { sensors: SensorErrors::Kept, ..tuned };
+    let axes = PerFlight { askew_deg: Some(3.0), ..tuned };
+    let trims = PerFlight { trims: Some(1.0), ..tuned };
     let structures = [
         ("as given", Fitted::Nothing),
-        ("tuned", of(PerFlight::default())),
+        ("tuned", of(tuned)),
+        ("tuned, sensor errors of the installation", of(sensors)),
         ("tuned, axes of each flight", of(axes)),
         ("tuned, trims of each flight", of(trims)),
     ];

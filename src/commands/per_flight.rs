@@ -1,6 +1,6 @@
 //! Options for constants that may differ from flight to flight.
 
-use crate::sysid::per_flight::PerFlight;
+use crate::sysid::per_flight::{PerFlight, SensorErrors};
 
 /// Largest standard deviation of an angle, °. Beyond this value the small-angle approximation fails.
 const MOST_DEG: f64 = 10.0;
@@ -21,10 +21,47 @@ pub struct PerFlightArguments {
     axes_askew: Option<f64>,
 }
 
+/// Constants of the flights and of the installation that a fit estimates.
+#[derive(clap::Args, Clone, Copy, Debug)]
+pub struct FitConstantsArguments {
+    #[command(flatten)]
+    per_flight: PerFlightArguments,
+    /// Errors of airspeed, angle of attack and sideslip that the fitted flights have in common.
+    #[arg(long, value_enum, value_name = "USE", default_value = "judged")]
+    sensor_errors: Use,
+}
+
+/// Use of the sensor errors that the fitted flights have in common.
+#[derive(clap::ValueEnum, Clone, Copy, Debug)]
+enum Use {
+    /// Kept as errors of the installation if the error of the held-out flights then falls by more than 1 %.
+    Judged,
+    /// Kept unless the error of the held-out flights then rises.
+    Kept,
+    /// Used for the fitted flights only.
+    Dropped,
+}
+
+impl FitConstantsArguments {
+    /// The constants that the options request.
+    pub fn asked(&self) -> PerFlight {
+        let sensors = match self.sensor_errors {
+            Use::Judged => SensorErrors::Judged,
+            Use::Kept => SensorErrors::Kept,
+            Use::Dropped => SensorErrors::Dropped,
+        };
+        PerFlight { sensors, ..self.per_flight.asked() }
+    }
+}
+
 impl PerFlightArguments {
     /// The constants that the options request.
     pub fn asked(&self) -> PerFlight {
-        PerFlight { trims: self.flight_trims, askew_deg: self.axes_askew }
+        PerFlight {
+            trims: self.flight_trims,
+            askew_deg: self.axes_askew,
+            ..PerFlight::default()
+        }
     }
 }
 

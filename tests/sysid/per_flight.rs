@@ -80,7 +80,7 @@ fn a_board_that_stands_askew_in_one_flight_is_found_there_and_not_in_the_other()
     let turned = [2.0, 0.0, 3.0];
     let flights = [flight([0.0; 2], turned, 1), flight([0.0; 2], [0.0; 3], 2)];
     let without = asked(&flights, PerFlight::default());
-    let found = asked(&flights, PerFlight { askew_deg: Some(3.0), trims: None });
+    let found = asked(&flights, PerFlight { askew_deg: Some(3.0), ..PerFlight::default() });
     let angles: Vec<_> = found.measurement.iter().filter(|m| m.id == "axes_askew").collect();
     // a tilt that explains more than the effects do is proposed unasked, with the same angles
     let unasked: Vec<_> = without.measurement.iter().filter(|m| m.id == "axes_askew").collect();
@@ -105,7 +105,7 @@ fn trims_of_flights_are_found_beside_the_model() {
     let flights: Vec<Reconstruction> =
         (0..3).map(|k| flight(trims[k], [0.0; 3], 11 + k as u64)).collect();
     let without = asked(&flights, PerFlight::default());
-    let found = asked(&flights, PerFlight { askew_deg: None, trims: Some(1.0) });
+    let found = asked(&flights, PerFlight { trims: Some(1.0), ..PerFlight::default() });
     for t in &found.trims {
         let k = flights.iter().position(|f| f.name == t.flight).unwrap();
         let own = trims[k];
@@ -145,7 +145,7 @@ fn free_runs_find_trims_and_axes_and_leave_the_model_what_flights_have_in_common
     };
     let (without, with) = (
         fitted(PerFlight::default()),
-        fitted(PerFlight { trims: Some(1.0), askew_deg: Some(3.0) }),
+        fitted(PerFlight { trims: Some(1.0), askew_deg: Some(3.0), ..PerFlight::default() }),
     );
     for (k, f) in with.flights.iter().enumerate() {
         for c in &f.own {

@@ -12,13 +12,13 @@ use crate::model::GreyBox;
 use crate::sysid::amend::leave_one_out::{Fitted, Scored, Structure, leave_one_out};
 use crate::sysid::amend::{Added, Options};
 use crate::sysid::flight_path::reconstruction::Reconstruction;
-use crate::sysid::per_flight::PerFlight;
+use crate::sysid::per_flight::{PerFlight, SensorErrors};
 
 /// Default standard deviation of the misalignment of the measured axes, °, for an installation aligned by eye.
 const ASKEW_DEG: f64 = 3.0;
 
-/// The structures to try: the model as given; its coefficients fitted; the same fit with trims of each flight, with a
-/// misalignment of each flight's axes, and with both; a fit with physical bounds as the only prior; a fit with each of
+/// The structures to try: the model as given; its coefficients fitted; the same fit with the flights' common sensor errors for
+/// the flight that is left out, with trims of each flight, with a misalignment of each flight's axes, and with both; a fit with physical bounds as the only prior; a fit with each of
 /// `effects`, and with all of them.
 pub fn structures(effects: &[Added], asked: PerFlight) -> Vec<Structure> {
     let of = |name: String, effects: &[Added], per_flight: PerFlight| Structure {
@@ -29,10 +29,12 @@ pub fn structures(effects: &[Added], asked: PerFlight) -> Vec<Structure> {
     let trims = PerFlight { trims: Some(asked.trims.unwrap_or(1.0)), ..none };
     let askew_deg = asked.askew_deg.unwrap_or(ASKEW_DEG);
     let axes = PerFlight { askew_deg: Some(askew_deg), ..none };
-    let both = PerFlight { trims: trims.trims, askew_deg: axes.askew_deg };
+    let both = PerFlight { trims: trims.trims, ..axes };
+    let sensors = PerFlight { sensors: SensorErrors::Kept, ..none };
     let mut all = vec![
         Structure { name: "as given".into(), fitted: Fitted::Nothing },
         of("--tune-only".into(), &[], none),
+        of("--tune-only --sensor-errors kept".into(), &[], sensors),
         of("--tune-only --flight-trims".into(), &[], trims),
         of(format!("--tune-only --axes-askew {askew_deg}"), &[], axes),
         of(format!("--tune-only --flight-trims --axes-askew {askew_deg}"), &[], both),

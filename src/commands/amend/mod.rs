@@ -20,7 +20,7 @@ use crate::commands::effect_files::{named_effects, own_effects};
 use crate::commands::files::{self, shipped};
 use crate::commands::given as read;
 use crate::commands::intake::{Intake, LogArguments};
-use crate::commands::per_flight::PerFlightArguments;
+use crate::commands::per_flight::FitConstantsArguments;
 use crate::commands::status::IN_DOUBT;
 use crate::commands::terminal::print_summary;
 use crate::logs::quoted;
@@ -73,7 +73,7 @@ pub struct Arguments {
     #[arg(long)]
     from_scratch: bool,
     #[command(flatten)]
-    per_flight: PerFlightArguments,
+    per_flight: FitConstantsArguments,
     /// Bound a coefficient by LEAST and MOST in place of the catalogue's bounds for an aircraft of this
     /// size, such as lift_linear.CL0=-2..2; the amended model's file records the bounds.
     #[arg(long = "bound", value_name = "NAME=LEAST..MOST", num_args = 1.., value_parser = bounds::bound)]

@@ -2,9 +2,10 @@
 //!
 //! An effect is a group of model terms with its coefficients, from the catalogue or from an effect file.
 
+mod installation;
 mod selection;
 
-use std::sync::Arc;
+use std::sync::OnceLock;
 use std::sync::atomic::AtomicUsize;
 
 use super::error::AmendError;
@@ -12,7 +13,7 @@ use super::flight::Flight;
 use super::judge::{self, JUDGED_AT_S, Judge};
 use super::output_error::{Fit, FitOptions};
 use super::result::{Amendment, Settings};
-use super::{answer, learned, parameters, story};
+use super::{answer, parameters, story};
 use crate::compare::{Answer, HorizonScore};
 use crate::diagnose::Candidate;
 use crate::flight_path::reconstruction::{Reconstruction, Segment};
@@ -175,7 +176,8 @@ fn of_right(
     };
     let (train, test) = (ready(flights)?, ready(held_out)?);
     let judge = Judge { test: &test, horizons_s: &options.horizons_s };
-    let ask = Ask { options, train: &train, judge: &judge, progress, begun: AtomicUsize::new(0) };
+    let (begun, sensors) = (AtomicUsize::new(0), OnceLock::new());
+    let ask = Ask { options, train: &train, judge: &judge, progress, begun, sensors };
     let (as_given, given) = (model, judge.scores(model));
     let scratch = (options.prior == Prior::Bounds).then(|| parameters::from_scratch(model));
     let model = scratch.as_ref().unwrap_or(model);
@@ -188,10 +190,11 @@ fn of_right(
     let Selection { fit, after, effects, .. } = best;
     let (fit, after, note) = match options.per_flight.angles() {
         0 => (fit, after, None),
-        _ => installed(fit, after, &judge),
+        _ => installation::aligned(fit, after, &judge),
     };
     let mut notes = notes(model, &tuned.model, &fit);
     notes.extend(story::apart(&options.per_flight).into_iter().chain(note));
+    notes.extend(ask.sensors.get().and_then(|decided| decided.note.clone()));
     let mut amendment = Amendment {
         schema: "greylag.amend/1",
         version: env!("CARGO_PKG_VERSION"),
@@ -265,43 +268,6 @@ fn right(model: &GreyBox, flights: &[Reconstruction], mut asked: PerFlight) -> R
     Right { flights, asked, notes }
 }
 
-/// Decides whether the fitted model keeps its installation, the misalignment of the axes that is common to all flights.
-/// Returns the fit, its held-out scores and a note on the decision.
-///
-/// The installation is kept if it does not increase the held-out error. It is removed if the error increases or is unknown.
-fn installed(
-    mut fit: Fit,
-    after: Vec<HorizonScore>,
-    judge: &Judge,
-) -> (Fit, Vec<HorizonScore>, Option<String>) {
-    let Some(shared) = fit.model.known.installation.clone() else { return (fit, after, None) };
-    let with = fit.model.known.clone();
-    Arc::make_mut(&mut fit.model.known).installation = None;
-    let bare = judge.scores(&fit.model);
-    let errors = judge::judged(&after).zip(judge::judged(&bare));
-    let errors = errors.filter(|(a, b)| !a.is_nan() && !b.is_nan());
-    let note = installation_note(&learned::in_words(&shared), errors);
-    if errors.is_some_and(|(a, b)| a <= b) {
-        fit.model.known = with;
-        return (fit, after, Some(note));
-    }
-    (fit, bare, Some(note))
-}
-
-/// Note on the estimated installation. `words` states its angles. `errors` are the scaled held-out errors with and without
-/// the installation; `None` if they are unknown.
-fn installation_note(words: &str, errors: Option<(f64, f64)>) -> String {
-    let found =
-        format!("The measured axes of the fitted flights have a common misalignment ({words})");
-    let Some((a, b)) = errors else {
-        return format!("{found}, which is not kept, because no held-out flight can validate it.");
-    };
-    let said = if a <= b { "kept as [installation]" } else { "not kept" };
-    format!(
-        "{found}, which is {said}: the error of the flights held out is {a:.5} with it, {b:.5} without."
-    )
-}
-
 /// Adds the effect `added` to `model` at its starting values.
 pub(super) fn joined(model: &mut GreyBox, added: &Added) -> Result<(), AmendError> {
     let start = match (&added.start, parameters::describe(&added.id)) {
@@ -362,21 +328,4 @@ pub fn split(flight: &Reconstruction) -> [Reconstruction; 2] {
         }
     }
     parts.map(|segments| Reconstruction { segments, ..flight.clone() })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_installation_that_no_held_out_flight_validates_is_noted_without_an_error() {
-        let note = installation_note("roll 1.0°", None);
-        assert!(note.contains("(roll 1.0°), which is not kept, because no held-out"), "{note}");
-        assert!(!note.contains("NaN") && !note.contains("the error of"), "{note}");
-        let note = installation_note("roll 1.0°", Some((0.25, 0.5)));
-        assert!(note.contains("kept as [installation]: the error of the flights"), "{note}");
-        assert!(note.ends_with("is 0.25000 with it, 0.50000 without."), "{note}");
-        let note = installation_note("roll 1.0°", Some((0.5, 0.25)));
-        assert!(note.contains("which is not kept: the error of the flights held out"), "{note}");
-    }
 }

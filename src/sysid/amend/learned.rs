@@ -2,13 +2,16 @@
 
 use super::flight::{OFFSETS, Own, SENSORS, SKEW};
 use crate::amend::error::AmendError;
-use crate::per_flight::PerFlight;
+use crate::per_flight::{PerFlight, SensorErrors};
 use greylag_model::{FlightConstants, Known};
 
 /// The mean of an angle over flights becomes a constant of the installation if it exceeds this number of standard errors.
 const CLEAR: f64 = 2.0;
 /// Source of the constants, as written to the model's file.
 const BY: &str = "greylag amend";
+/// Sensor errors that belong to an installation, as indices of `greylag_model::known::SENSORS`: airspeed, α, β. A gyro bias
+/// changes each time that the sensor is switched on.
+const INSTALLED: [usize; 3] = [0, 4, 5];
 
 /// A flight's constants with the standard deviations of its unknowns, in the order of [`Own::unknowns`].
 pub(super) struct Learned<'a> {
@@ -54,10 +57,11 @@ pub(super) fn distinct(names: &[&str], asked: &PerFlight) -> Result<(), AmendErr
 /// zero.
 pub(super) fn known(before: &Known, flights: &[Learned], asked: &PerFlight) -> Known {
     let anew = asked.angles() > 0;
-    if !anew && !asked.has_trims() {
-        return without_trims(before);
-    }
     let mut all = without_trims(before);
+    all.installation = installation(all.installation.as_ref(), flights, asked);
+    if !anew && !asked.has_trims() {
+        return all;
+    }
     let constants = |f: &Learned| {
         let known = before.of(f.name).unwrap_or_default();
         let had = if anew { Default::default() } else { known.sensors.unwrap_or_default() };
@@ -71,9 +75,6 @@ pub(super) fn known(before: &Known, flights: &[Learned], asked: &PerFlight) -> K
         }
     };
     all.flights.extend(flights.iter().map(|f| (f.name.to_owned(), constants(f))));
-    if anew {
-        all.installation = installation(flights);
-    }
     all
 }
 
@@ -85,17 +86,42 @@ fn without_trims(known: &Known) -> Known {
     kept
 }
 
-/// Misalignment of the installation: mean angles over `flights`. `None` if no mean differs significantly from zero.
-fn installation(flights: &[Learned]) -> Option<FlightConstants> {
-    let angles: Vec<_> = flights.iter().map(Learned::angles_deg).collect();
-    let axes: [f64; 3] =
-        std::array::from_fn(|k| common(&angles.iter().map(|of| of[k]).collect::<Vec<_>>()));
-    if axes.iter().all(|angle| *angle == 0.0) {
-        return None;
+/// The installation after a fit to `flights`, from the installation `before`: mean misalignment angles if the fit has estimated
+/// any, and mean sensor errors. `None` if nothing differs significantly from zero.
+///
+/// A fit without misalignment angles has corrected its flights with the sensor errors of `before`. Its own are added to them.
+fn installation(
+    before: Option<&FlightConstants>,
+    flights: &[Learned],
+    asked: &PerFlight,
+) -> Option<FlightConstants> {
+    let anew = asked.angles() > 0;
+    let before = before.filter(|_| !anew);
+    let clear = |x: &f64| *x != 0.0;
+    let axes: Option<[f64; 3]> =
+        anew.then(|| std::array::from_fn(|k| over(flights, |f| f.angles_deg()[k])));
+    let axes = axes.filter(|all| all.iter().any(clear));
+    let mut sensors = [0.0; OFFSETS.len()];
+    if asked.sensors != SensorErrors::Dropped {
+        INSTALLED.iter().for_each(|k| sensors[*k] = over(flights, |f| f.sensors()[*k]));
     }
+    if axes.is_none() && !sensors.iter().any(clear) {
+        return before.cloned();
+    }
+    let had = before.and_then(|b| b.sensors).unwrap_or_default();
+    let sensors: [f64; OFFSETS.len()] = std::array::from_fn(|k| had[k] + sensors[k]);
     let number = flights.len();
-    let source = format!("{BY}: the mean of {number} flight(s), angles that are clear of zero");
-    Some(FlightConstants { source, axes_deg: Some(axes), trims: None, sensors: None })
+    Some(FlightConstants {
+        source: format!("{BY}: the mean of {number} flight(s), constants that are clear of zero"),
+        axes_deg: axes.or(before.and_then(|b| b.axes_deg)),
+        trims: None,
+        sensors: sensors.iter().any(clear).then_some(sensors),
+    })
+}
+
+/// The constant `of` a flight (value and standard deviation) that `flights` have in common, see [`common`].
+fn over(flights: &[Learned], of: impl Fn(&Learned) -> [f64; 2]) -> f64 {
+    common(&flights.iter().map(of).collect::<Vec<_>>())
 }
 
 /// The mean of `estimates` (value and standard deviation), or zero if the mean is at most twice its standard error. The
@@ -108,6 +134,28 @@ fn common(estimates: &[[f64; 2]]) -> f64 {
         estimates.iter().map(|[x, _]| (x - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
     let error = (known.max(spread) / n).sqrt();
     if mean.abs() > CLEAR * error { mean } else { 0.0 }
+}
+
+/// The sensor errors that the installation `after` has in addition to those of `before`, in words; `None` if there are none.
+pub(super) fn sensors_in_words(
+    before: Option<&FlightConstants>,
+    after: &FlightConstants,
+) -> Option<String> {
+    let had = before.and_then(|b| b.sensors).unwrap_or_default();
+    let has = after.sensors.unwrap_or_default();
+    let of = |k: usize, name: &str, factor: f64, unit: &str| {
+        let by = has[k] - had[k];
+        (by != 0.0).then(|| format!("{name} {:+.1}{unit}", factor * by))
+    };
+    let degree = 1f64.to_degrees();
+    let [airspeed, alpha, beta] = INSTALLED;
+    let all = [
+        of(airspeed, "airspeed", 100.0, " %"),
+        of(alpha, "angle of attack", degree, "°"),
+        of(beta, "sideslip", degree, "°"),
+    ];
+    let said: Vec<String> = all.into_iter().flatten().collect();
+    (!said.is_empty()).then(|| said.join(", "))
 }
 
 /// Misalignment angles of an installation in words.
@@ -124,8 +172,8 @@ mod tests {
 
     #[test]
     fn two_flights_of_one_name_have_no_constants_of_their_own() {
-        let trims = PerFlight { trims: Some(1.0), askew_deg: None };
-        let askew = PerFlight { trims: None, askew_deg: Some(3.0) };
+        let trims = PerFlight { trims: Some(1.0), ..PerFlight::default() };
+        let askew = PerFlight { askew_deg: Some(3.0), ..PerFlight::default() };
         let twice = ["flight.csv", "other.csv", "flight.csv"];
         for asked in [trims, askew] {
             let why = distinct(&twice, &asked).unwrap_err().to_string();

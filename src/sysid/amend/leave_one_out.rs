@@ -11,7 +11,7 @@ use super::output_error::{self, FitOptions};
 use super::parameters;
 use crate::compare::forecast;
 use crate::flight_path::reconstruction::Reconstruction;
-use crate::per_flight::PerFlight;
+use crate::per_flight::{PerFlight, SensorErrors};
 use crate::per_flight::known::put_right;
 use crate::progress::{Progress, ignore_progress, report};
 use crate::weak_form::prepared::Prepared;
@@ -184,10 +184,20 @@ fn error_of(
     let error = |model: &GreyBox| judged(&scores(model, test, &[set.at])).unwrap_or(f64::NAN);
     let (start, options) = match fitted {
         Fitted::Nothing => return Ok(Ok(error(model))),
-        Fitted::FromScratch => (parameters::from_scratch(model), FitOptions::default()),
+        Fitted::FromScratch => {
+            let per_flight =
+                PerFlight { sensors: SensorErrors::Dropped, ..PerFlight::default() };
+            (parameters::from_scratch(model), FitOptions { per_flight, ..FitOptions::default() })
+        }
         Fitted::Coefficients { effects, per_flight } => {
             let added = effects.iter().map(|a| a.id.clone()).collect();
-            let options = FitOptions { added, per_flight: *per_flight, ..FitOptions::default() };
+            // no further flight can judge the common sensor errors
+            let sensors = match per_flight.sensors {
+                SensorErrors::Kept => SensorErrors::Kept,
+                SensorErrors::Judged | SensorErrors::Dropped => SensorErrors::Dropped,
+            };
+            let per_flight = PerFlight { sensors, ..*per_flight };
+            let options = FitOptions { added, per_flight, ..FitOptions::default() };
             (with(model, effects)?, options)
         }
     };

@@ -61,9 +61,11 @@ pub fn fly_with(
     for flight in flights {
         let known = KnownFlight::of(model, flight);
         let (with, right) = known.as_ref().map_or((model, flight), |k| (&k.model, &k.flight));
-        let (flown, mut trace) = fly_one(with, &right.acting(with), &times, observer);
+        let (mut flown, mut trace) = fly_one(with, &right.acting(with), &times, observer);
         if let Some(known) = &known {
             measured_from(&mut trace, known);
+            let pairs = flown.iter_mut().flatten().flatten();
+            pairs.for_each(|pair| *pair = pair.map(|state| known.as_measured(state)));
         }
         runs.extend(flown);
         traces.push(trace);

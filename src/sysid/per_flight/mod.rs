@@ -19,6 +19,29 @@ pub struct PerFlight {
     /// Prior standard deviation of each of the three misalignment angles, °; `None` for aligned axes.
     #[serde(rename = "axes_askew_deg", skip_serializing_if = "Option::is_none")]
     pub askew_deg: Option<f64>,
+    /// Use of the sensor errors that the fitted flights have in common.
+    #[serde(rename = "sensor_errors", skip_serializing_if = "SensorErrors::is_judged")]
+    pub sensors: SensorErrors,
+}
+
+/// Use of the errors of airspeed, angle of attack and sideslip that all fitted flights have in common. A fit always
+/// estimates the sensor errors of its own flights. As errors of the installation they correct other flights too.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SensorErrors {
+    /// They become errors of the installation if the error of the held-out flights then decreases by more than 1 %.
+    #[default]
+    Judged,
+    /// They become errors of the installation unless the error of the held-out flights then increases.
+    Kept,
+    /// They correct the fitted flights only.
+    Dropped,
+}
+
+impl SensorErrors {
+    fn is_judged(&self) -> bool {
+        *self == SensorErrors::Judged
+    }
 }
 
 /// A constant estimated for each flight.

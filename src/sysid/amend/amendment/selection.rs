@@ -1,7 +1,9 @@
 //! Forward selection of the requested effects. Free runs over held-out flights decide which effects are accepted.
 
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use super::installation::Sensors;
 use super::{Added, Options, joined};
 use crate::amend::conventions::{Convention, Tried, closer};
 use crate::amend::error::AmendError;
@@ -38,6 +40,8 @@ pub(super) struct Ask<'a> {
     pub(super) progress: &'a Progress<'a>,
     /// Number of fits that have begun; the first fit has no added effects.
     pub(super) begun: AtomicUsize,
+    /// Decision on the flights' common sensor errors, made after the first fit.
+    pub(super) sensors: OnceLock<Sensors>,
 }
 
 impl Ask<'_> {
@@ -45,7 +49,7 @@ impl Ask<'_> {
     /// others are tried one by one.
     pub(super) fn selected(&self, model: &GreyBox) -> Result<Selection, AmendError> {
         let tuned = match &self.options.tuned {
-            Some(known) => known.clone(),
+            Some(known) => self.with_sensors(known.clone(), model),
             None => self.fit(model, &FitOptions::default())?,
         };
         let scores = self.judge.scores(&tuned.model);
@@ -236,7 +240,17 @@ impl Ask<'_> {
         self.begun.fetch_add(1, Ordering::Relaxed);
         let per_flight = self.options.per_flight;
         let options = FitOptions { per_flight, ..options.clone() };
-        output_error::fit(model, self.train, &options, &progress)
+        let fit = output_error::fit(model, self.train, &options, &progress)?;
+        Ok(self.with_sensors(fit, model))
+    }
+
+    /// `fit` of `model` with the flights' common sensor errors as the first fit has decided.
+    fn with_sensors(&self, mut fit: Fit, model: &GreyBox) -> Fit {
+        let asked = self.options.per_flight.sensors;
+        let decided =
+            self.sensors.get_or_init(|| Sensors::decided(asked, model, &fit, self.judge));
+        decided.apply(&mut fit, model);
+        fit
     }
 
     /// Fractions of the whole selection that are complete before and after the next fit. They are limited to 0.98, because
