@@ -9,6 +9,7 @@
 //! (`learning_curve.rs`). With `-- --cuts` the same training data are fitted whole and cut (`cuts.rs`).
 
 mod aircraft;
+mod corrected;
 mod cuts;
 mod learning_curve;
 mod least_squares;
@@ -30,9 +31,10 @@ use least_squares::least_squares;
 /// Horizons of the free runs, s.
 const HORIZONS_S: [f64; 3] = [1.0, 2.0, 5.0];
 /// What is judged, in the order of the table.
-const WAYS: [&str; 7] = [
+const WAYS: [&str; 8] = [
     "from geometry",
     "fitted",
+    "fitted, corrected",
     "least squares",
     "hold the state",
     "straight on",
@@ -41,10 +43,14 @@ const WAYS: [&str; 7] = [
 ];
 /// Place of the fitted model in [`WAYS`].
 const FITTED: usize = 1;
+/// Place of the fitted model with the correction of its free runs in [`WAYS`].
+const CORRECTED: usize = 2;
+/// Place of least squares in [`WAYS`].
+const LEAST_SQUARES: usize = 3;
 /// Place of the first forecast without aerodynamics in [`WAYS`].
-const HOLD: usize = 3;
+const HOLD: usize = 4;
 /// Place of the ARX forecast in [`WAYS`] whose order is chosen.
-const CHOSEN_ARX: usize = 6;
+const CHOSEN_ARX: usize = 7;
 /// Place of the structure among those of [`structures`] that is fitted where the data are too short for a choice.
 const TUNED: usize = 1;
 
@@ -95,7 +101,7 @@ fn table() -> Result<()> {
 
 /// Prints a table of `all`, the errors on each flight held out: mean and standard error of every way.
 fn print_errors(all: &[Errors]) {
-    println!("  {:<18}{:>20}{:>20}{:>20}", "", "1 s", "2 s", "5 s");
+    println!("  {:<20}{:>20}{:>20}{:>20}", "", "1 s", "2 s", "5 s");
     for (k, way) in WAYS.iter().enumerate() {
         print_row(way, &all.iter().map(|e| e[k]).collect::<Vec<_>>());
     }
@@ -129,20 +135,25 @@ fn judged(model: &GreyBox, fit: &[Reconstruction], test: &Reconstruction) -> Res
     };
     let parts = parts(fit);
     let (seen, seen_parts, unseen) = (ready(fit)?, ready(&parts[..])?, ready(test)?);
-    let (fitted, structure) = fitted(model, fit, &parts);
+    let (fitted, structure, mut named) = fitted(model, fit, &parts);
     let mut errors = [[f64::NAN; HORIZONS_S.len()]; WAYS.len()];
-    for (row, model) in errors.iter_mut().zip([model, &fitted, &least_squares(model, &seen)]) {
-        *row = scaled(&scores(model, test, &HORIZONS_S)?);
+    for (place, model) in
+        [(0, model), (FITTED, &fitted), (LEAST_SQUARES, &least_squares(model, &seen))]
+    {
+        errors[place] = scaled(&scores(model, test, &HORIZONS_S)?);
     }
+    let correction = corrected::chosen(&parts, |others| tuned(model, others, structure))?;
+    errors[CORRECTED] = corrected::errors(&fitted, fit, test, correction)?;
+    named = format!("{named}, {}", correction.in_words());
     let forecasts = forecast::on_unseen(&seen, &unseen, model.scale(), &HORIZONS_S);
     for (row, forecast) in errors[HOLD..].iter_mut().zip(forecasts) {
         *row = scaled(&forecast.free_run);
     }
-    let (arx, named) = chosen_arx(&seen, &seen_parts, model.scale());
+    let (arx, of_arx) = chosen_arx(&seen, &seen_parts, model.scale());
     if let Some(arx) = arx {
         errors[CHOSEN_ARX] = scaled(&arx.scores(&unseen, model.scale(), &HORIZONS_S)?);
     }
-    Ok(Judged { errors, structure, arx: named })
+    Ok(Judged { errors, structure: named, arx: of_arx })
 }
 
 /// The scaled errors of `scores`, one for each horizon.
@@ -179,7 +190,11 @@ fn structures() -> [Structure; 5] {
 /// `model` fitted to all of `fit` with the structure that predicts each of `parts` best from the others, and what that is.
 ///
 /// Where the parts are too short for a choice, the coefficients alone are fitted; where a fit fails, the model stays as given.
-fn fitted(model: &GreyBox, fit: &[Reconstruction], parts: &[Reconstruction]) -> (GreyBox, String) {
+fn fitted(
+    model: &GreyBox,
+    fit: &[Reconstruction],
+    parts: &[Reconstruction],
+) -> (GreyBox, Option<PerFlight>, String) {
     let structures = structures();
     let (chosen, name) =
         match leave_one_out(model, parts, &structures, &HORIZONS_S, &ignore_progress) {
@@ -193,14 +208,28 @@ fn fitted(model: &GreyBox, fit: &[Reconstruction], parts: &[Reconstruction]) -> 
             }
         };
     let Fitted::Coefficients { per_flight, .. } = &structures[chosen].fitted else {
-        return (model.clone(), name);
+        return (model.clone(), None, name);
     };
-    let options = Options { per_flight: *per_flight, ..Options::default() };
-    match amend(model, fit, fit, &options, &ignore_progress) {
-        Ok(amended) => (amended.model, name),
+    match tuned(model, fit, Some(*per_flight)) {
+        Some(fitted) => (fitted, Some(*per_flight), name),
+        None => (model.clone(), None, "as given, for no fit was possible".into()),
+    }
+}
+
+/// `model` with its coefficients fitted to `flights`, with the constants `per_flight`; as given if these are `None`. `None` if no
+/// fit is possible.
+fn tuned(
+    model: &GreyBox,
+    flights: &[Reconstruction],
+    per_flight: Option<PerFlight>,
+) -> Option<GreyBox> {
+    let Some(per_flight) = per_flight else { return Some(model.clone()) };
+    let options = Options { per_flight, ..Options::default() };
+    match amend(model, flights, flights, &options, &ignore_progress) {
+        Ok(amended) => Some(amended.model),
         Err(why) => {
             eprintln!("  no fit: {why}");
-            (model.clone(), "as given, for no fit was possible".into())
+            None
         }
     }
 }

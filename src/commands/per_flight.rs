@@ -57,11 +57,7 @@ impl FitConstantsArguments {
 impl PerFlightArguments {
     /// The constants that the options request.
     pub fn asked(&self) -> PerFlight {
-        PerFlight {
-            trims: self.flight_trims,
-            askew_deg: self.axes_askew,
-            ..PerFlight::default()
-        }
+        PerFlight { trims: self.flight_trims, askew_deg: self.axes_askew, ..PerFlight::default() }
     }
 }
 

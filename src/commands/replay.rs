@@ -137,21 +137,21 @@ struct Document {
     differences: Vec<Differing>,
 }
 
-/// A command that differs from the recorded one: aileron, elevator, throttle.
+/// A command that differs from the recorded one: aileron, elevator, throttle, rudder.
 #[derive(Serialize)]
 struct Differing {
     time_s: f64,
-    recorded: [f64; 3],
-    replayed: [f64; 3],
+    recorded: [f64; 4],
+    replayed: [f64; 4],
 }
 
 impl From<&Outcome> for Document {
     fn from(of: &Outcome) -> Document {
-        let three = |c: &Command| [c.aileron, c.elevator, c.throttle];
+        let all = |c: &Command| [c.aileron, c.elevator, c.throttle, c.rudder];
         let differing = |d: &Difference| Differing {
             time_s: d.time.as_secs_f64(),
-            recorded: three(&d.recorded),
-            replayed: three(&d.replayed),
+            recorded: all(&d.recorded),
+            replayed: all(&d.replayed),
         };
         Document {
             ticks: of.ticks,
@@ -201,7 +201,9 @@ fn print(outcome: &Outcome) {
         println!("{} ticks have no state in flight.tlog", outcome.without_state);
     }
     for d in &outcome.differences {
-        let words = |c: &Command| format!("{:+.6} {:+.6} {:.6}", c.aileron, c.elevator, c.throttle);
+        let words = |c: &Command| {
+            format!("{:+.6} {:+.6} {:.6} {:+.6}", c.aileron, c.elevator, c.throttle, c.rudder)
+        };
         println!(
             "  {:10.3} s: recorded {}, replayed {}",
             d.time.as_secs_f64(),

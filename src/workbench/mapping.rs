@@ -20,10 +20,14 @@ fn with_column(text: &str, column: &str, from: &str, scale: f64) -> Option<Strin
     let mut table: toml::Table = toml::from_str(text).ok()?;
     table.insert("schema".into(), 1.into());
     let columns = table.entry("columns").or_insert(toml::Table::new().into()).as_table_mut()?;
-    let before = columns.get(column).and_then(|c| number(c.get("scale")?)).unwrap_or(1.0);
-    let mut entry = toml::Table::new();
-    entry.insert("from".into(), from.into());
+    let mut entry = columns.get(column).and_then(|c| c.as_table()).cloned().unwrap_or_default();
+    let before = entry.get("scale").and_then(number).unwrap_or(1.0);
+    entry.entry("from").or_insert_with(|| from.into());
     entry.insert("scale".into(), (before * scale).into());
+    // the offset is added after the scale
+    if let Some(offset) = entry.get("offset").and_then(number) {
+        entry.insert("offset".into(), (offset * scale).into());
+    }
     columns.insert(column.into(), entry.into());
     toml::to_string(&table).ok()
 }
@@ -98,5 +102,18 @@ mod tests {
         assert_eq!(read["columns"]["az_mps2"]["scale"].as_float(), Some(-9.80665));
         assert_eq!(read["columns"]["p_radps"]["from"].as_str(), Some("csv.p_radps"));
         assert_eq!(read["schema"].as_integer(), Some(1));
+    }
+
+    #[test]
+    fn the_field_and_the_offset_of_a_mapped_column_are_kept() {
+        let mapped =
+            "[columns]\naz_mps2 = { from = \"imu.az\", offset = 2.0, rate_over_s = 0.1 }\n";
+        let scaled = with_column(mapped, "az_mps2", "csv.az_mps2", -1.0).unwrap();
+        let read: toml::Table = toml::from_str(&scaled).unwrap();
+        let entry = &read["columns"]["az_mps2"];
+        assert_eq!(entry["from"].as_str(), Some("imu.az"));
+        assert_eq!(entry["scale"].as_float(), Some(-1.0));
+        assert_eq!(entry["offset"].as_float(), Some(-2.0));
+        assert_eq!(entry["rate_over_s"].as_float(), Some(0.1));
     }
 }

@@ -235,7 +235,7 @@ fn an_interrupted_training_ends_the_same_to_the_bit() {
 
 /// A table is no coefficient, but the residual has learned what it leaves over.
 #[test]
-fn a_checkpoint_of_a_prior_with_another_table_is_refused() {
+fn a_checkpoint_of_a_prior_with_another_table_or_gravity_is_refused() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/jsbsim.toml");
     let text = std::fs::read_to_string(&path).unwrap();
     let prior = GreyBox::parse(&text, &path).unwrap();
@@ -246,7 +246,11 @@ fn a_checkpoint_of_a_prior_with_another_table_is_refused() {
     let flights = tracks(&prior, &prior);
     let mut same = Trainer::new(recipe(10), &prior, flights.clone()).unwrap();
     same.resume(trainer(&prior).checkpoint()).unwrap();
-    let mut another = Trainer::new(recipe(10), &other, flights).unwrap();
+    let mut another = Trainer::new(recipe(10), &other, flights.clone()).unwrap();
+    assert!(another.resume(trainer(&prior).checkpoint()).is_err());
+    let mut lighter = prior.clone();
+    lighter.atmosphere.gravity = 9.8;
+    let mut another = Trainer::new(recipe(10), &lighter, flights).unwrap();
     assert!(another.resume(trainer(&prior).checkpoint()).is_err());
 }
 

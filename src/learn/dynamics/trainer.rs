@@ -158,9 +158,12 @@ impl Trainer {
         let tables: String =
             self.prior.tables().map(|(id, table)| format!(" {id} {table:?}")).collect();
         let grid = self.prior.thrust_grid().map(|grid| format!(" {grid:?}")).unwrap_or_default();
+        let air = self.prior.atmosphere;
         let written: String = self.prior.written().map(|own| format!(" {}", own.text)).collect();
         let data = &self.data;
-        hash(format!("{recipe} {prior} {airframe} {data}{tables}{grid}{written}").as_bytes())
+        hash(
+            format!("{recipe} {prior} {airframe} {air:?} {data}{tables}{grid}{written}").as_bytes(),
+        )
     }
 
     /// Number of updates made.

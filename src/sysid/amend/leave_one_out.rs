@@ -11,8 +11,8 @@ use super::output_error::{self, FitOptions};
 use super::parameters;
 use crate::compare::forecast;
 use crate::flight_path::reconstruction::Reconstruction;
-use crate::per_flight::{PerFlight, SensorErrors};
 use crate::per_flight::known::put_right;
+use crate::per_flight::{PerFlight, SensorErrors};
 use crate::progress::{Progress, ignore_progress, report};
 use crate::weak_form::prepared::Prepared;
 use greylag_model::GreyBox;
@@ -185,8 +185,7 @@ fn error_of(
     let (start, options) = match fitted {
         Fitted::Nothing => return Ok(Ok(error(model))),
         Fitted::FromScratch => {
-            let per_flight =
-                PerFlight { sensors: SensorErrors::Dropped, ..PerFlight::default() };
+            let per_flight = PerFlight { sensors: SensorErrors::Dropped, ..PerFlight::default() };
             (parameters::from_scratch(model), FitOptions { per_flight, ..FitOptions::default() })
         }
         Fitted::Coefficients { effects, per_flight } => {

@@ -12,7 +12,9 @@ use super::forecast::{self, Forecast};
 use super::free_run::error;
 use super::result::HorizonScore;
 use crate::flight_path::reconstruction::Instant;
+use crate::per_flight::known::KnownFlight;
 use crate::weak_form::prepared::Prepared;
+use greylag_model::{GreyBox, Memory};
 use greylag_num::statistics::mean;
 
 /// Number of regressors of one sample: eight states, aileron, elevator, throttle and rudder.
@@ -124,6 +126,35 @@ impl Arx {
         Sums::of(flights.iter(), choice.order).arx(choice, substeps)
     }
 
+    /// Fits a linear residual of `model`: the differences between the measured rates and those of `model`, as a linear function of
+    /// states and deflections. The rates of roll and pitch angle have none, because their equations are exact. The constants
+    /// of the flights in the file of `model` are applied.
+    ///
+    /// # Errors
+    /// As [`Arx::fit`].
+    pub fn of_residual(
+        model: &GreyBox,
+        flights: &[Prepared],
+        choice: Choice,
+    ) -> Result<Arx, ArxError> {
+        if choice.order == 0 {
+            return Err(ArxError::NoOrder);
+        }
+        let substeps = flights.first().map_or(1, |f| f.substeps);
+        same_steps(substeps, flights)?;
+        let mut sums = Sums::none(choice.order);
+        for flight in flights {
+            let known = KnownFlight::of(model, flight);
+            let (model, flight) = known.as_ref().map_or((model, flight), |k| (&k.model, &k.flight));
+            let flight = &*flight.acting(model);
+            let model = flight.stepping(model);
+            sums.add(flight, choice.order, |segment| steps(&model, flight, segment));
+        }
+        let mut arx = sums.arx(choice, substeps)?;
+        arx.slopes.rows_mut(0, 2).fill(0.0);
+        Ok(arx)
+    }
+
     /// The model of order 1 without a ridge, however few samples `flights` have. `None` if a coefficient is not finite.
     pub(super) fn first_order(flights: &[Prepared]) -> Option<Arx> {
         let slopes = Sums::of(flights.iter(), 1).slopes(0.0)?;
@@ -155,8 +186,13 @@ impl Arx {
     /// The state `dt` (s) after `past[0]`. `past` has the present state and those before it, the newest first; `flown` has the
     /// samples of the segment up to the present one.
     pub(super) fn next(&self, past: &[[f64; 8]], flown: &[Instant], dt: f64) -> [f64; 8] {
-        let rate = &self.slopes * regressors(past, flown);
+        let rate = self.rates(past, flown);
         std::array::from_fn(|k| past[0][k] + dt * rate[k])
+    }
+
+    /// Rates of the eight states, or residual rates if the model is a linear residual, per second. Arguments as in `next`.
+    pub(super) fn rates(&self, past: &[[f64; 8]], flown: &[Instant]) -> DVector<f64> {
+        &self.slopes * regressors(past, flown)
     }
 }
 
@@ -232,6 +268,15 @@ fn error_left_out(
     (!logarithms.is_empty()).then(|| mean(&logarithms).exp())
 }
 
+/// States of `model` one sample after each measured state of `segment` but the last.
+fn steps(model: &GreyBox, flight: &Prepared, segment: &[Instant]) -> Vec<[f64; 8]> {
+    let mut memory = Memory::default();
+    let one = |pair: &[Instant]| {
+        flight.advance(model, pair[0].state, [&pair[0], &pair[1]], &mut memory).to_array()
+    };
+    segment.windows(2).map(one).collect()
+}
+
 /// Number of unknowns of each state: the coefficients of the samples, and a constant.
 fn unknowns(order: usize) -> usize {
     OF_SAMPLE * order + 1
@@ -277,23 +322,32 @@ struct Sums {
 impl Sums {
     /// Sums over all samples of `flights` that have `order` − 1 samples before them and one after them; `order` is at least 1.
     fn of<'a>(flights: impl Iterator<Item = &'a Prepared>, order: usize) -> Sums {
+        let mut sums = Sums::none(order);
+        let held = |segment: &[Instant]| segment.iter().map(|at| at.state.to_array()).collect();
+        flights.for_each(|flight| sums.add(flight, order, held));
+        sums
+    }
+
+    fn none(order: usize) -> Sums {
         let size = unknowns(order);
-        let (gram, moments) = (DMatrix::zeros(size, size), DMatrix::zeros(size, 8));
-        let mut sums = Sums { gram, moments, rows: 0 };
-        for flight in flights {
-            for segment in &flight.segments {
-                for at in order - 1..segment.len().saturating_sub(1) {
-                    let states = past(segment, at, order);
-                    let row = regressors(&states, &segment[..=at]);
-                    let step = error(&states[0], &segment[at + 1].state.to_array());
-                    let rate = DVector::from_column_slice(&step.map(|x| x / flight.dt));
-                    sums.gram.ger(1.0, &row, &row, 1.0);
-                    sums.moments.ger(1.0, &row, &rate, 1.0);
-                    sums.rows += 1;
-                }
+        Sums { gram: DMatrix::zeros(size, size), moments: DMatrix::zeros(size, 8), rows: 0 }
+    }
+
+    /// Adds the samples of `flight`. `base` predicts the state after each sample of a segment; the rates in the sums are the
+    /// remaining differences.
+    fn add(&mut self, flight: &Prepared, order: usize, base: impl Fn(&[Instant]) -> Vec<[f64; 8]>) {
+        for segment in &flight.segments {
+            let predicted = base(segment);
+            for at in order - 1..segment.len().saturating_sub(1) {
+                let states = past(segment, at, order);
+                let row = regressors(&states, &segment[..=at]);
+                let step = error(&predicted[at], &segment[at + 1].state.to_array());
+                let rate = DVector::from_column_slice(&step.map(|x| x / flight.dt));
+                self.gram.ger(1.0, &row, &row, 1.0);
+                self.moments.ger(1.0, &row, &rate, 1.0);
+                self.rows += 1;
             }
         }
-        sums
     }
 
     /// The model with the order of the sums and the ridge of `choice`.

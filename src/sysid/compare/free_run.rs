@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use rayon::prelude::*;
 
-use super::observer::{Disturbance, Observer};
+use super::correction::{Acting, Correction};
 use super::result::{GrowthPoint, HorizonScore, StateScore};
 use crate::flight_path::reconstruction::Instant;
 use crate::per_flight::known::KnownFlight;
@@ -44,12 +44,12 @@ pub fn fly(model: &GreyBox, flights: &[Prepared], horizons: &[f64]) -> (Runs, Ve
     fly_with(model, flights, horizons, None)
 }
 
-/// As [`fly`], with the disturbance that `observer` finds before each run.
+/// As [`fly`], with the model's rates corrected by `correction`.
 pub fn fly_with(
     model: &GreyBox,
     flights: &[Prepared],
     horizons: &[f64],
-    observer: Option<Observer>,
+    correction: Option<Correction>,
 ) -> (Runs, Vec<Trace>) {
     let longest = horizons.iter().copied().fold(0.0, f64::max);
     let growth = (1..=GROWTH_POINTS).map(|k| longest * k as f64 / GROWTH_POINTS as f64);
@@ -61,7 +61,7 @@ pub fn fly_with(
     for flight in flights {
         let known = KnownFlight::of(model, flight);
         let (with, right) = known.as_ref().map_or((model, flight), |k| (&k.model, &k.flight));
-        let (mut flown, mut trace) = fly_one(with, &right.acting(with), &times, observer);
+        let (mut flown, mut trace) = fly_one(with, &right.acting(with), &times, correction);
         if let Some(known) = &known {
             measured_from(&mut trace, known);
             let pairs = flown.iter_mut().flatten().flatten();
@@ -106,7 +106,7 @@ fn fly_one(
     model: &GreyBox,
     flight: &Prepared,
     times: &[f64],
-    observer: Option<Observer>,
+    correction: Option<Correction>,
 ) -> (Vec<Vec<Look>>, Trace) {
     let every = ((START_EVERY_S / flight.dt).round() as usize).max(1);
     let looks: Vec<usize> =
@@ -122,8 +122,8 @@ fn fly_one(
             let flown: Vec<(Vec<Look>, Vec<[f64; 8]>)> = starts
                 .par_iter()
                 .map(|&start| {
-                    let disturbed = observer.map(|o| o.before(&model, flight, segment, start));
-                    run(&model, flight, segment, start, [&looks[..], &[every]], disturbed)
+                    let acting = correction.map(|c| c.from(&model, flight, segment, start));
+                    run(&model, flight, segment, start, [&looks[..], &[every]], acting)
                 })
                 .collect();
             for (start, (looks, path)) in starts.iter().zip(flown) {
@@ -189,7 +189,7 @@ fn run(
     segment: &[Instant],
     start: usize,
     [looks, keep]: [&[usize]; 2],
-    mut disturbance: Option<Disturbance>,
+    mut correction: Option<Acting>,
 ) -> (Vec<Look>, Vec<[f64; 8]>) {
     let keep = keep[0];
     let scale = model.scale();
@@ -208,10 +208,10 @@ fn run(
     let mut path = vec![state.to_array()];
     for i in start..last.max((start + keep).min(segment.len()) - 1) {
         state = advance(i, state, &mut memory);
-        if let Some(disturbance) = &mut disturbance {
-            let mut now = state.to_array();
-            disturbance.act(&mut now, flight.dt);
-            state = State::from_array(now);
+        if let Some(correction) = &mut correction {
+            let mut next = state.to_array();
+            correction.act(&mut next, &segment[..=i], flight.dt);
+            state = State::from_array(next);
         }
         let measured = segment[i + 1].state.to_array();
         let error = error(&measured, &state.to_array());

@@ -6,6 +6,7 @@ pub mod answer;
 pub mod arx;
 mod bins;
 pub mod bootstrap;
+pub mod correction;
 mod discovery;
 mod doubt;
 mod error;
@@ -14,7 +15,6 @@ mod flight;
 pub mod forecast;
 pub mod free_run;
 mod known;
-pub mod observer;
 mod power;
 mod result;
 mod run;
@@ -29,6 +29,6 @@ pub use result::{
     GrowthPoint, HorizonScore, KnownUse, Map, MapCell, ModelResult, ModelTrace, NuisanceResult,
     Regime, RegimeBins, Settings, StateScore,
 };
-pub use run::{Options, abstentions, compare, scores, scores_with};
+pub use run::{Options, abstentions, compare, scores};
 #[cfg(feature = "study")]
 pub(crate) use verdict::unpredicted;

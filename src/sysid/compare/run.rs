@@ -13,7 +13,6 @@ use super::flight;
 use super::forecast::forecasts;
 use super::free_run::{self, DIVERGENCE_BOUND, START_EVERY_S};
 use super::known;
-use super::observer::Observer;
 use super::power::Power;
 use super::result::{
     Abstention, ChannelResult, ChannelTrace, Comparison, HorizonScore, ModelResult, ModelTrace,
@@ -118,23 +117,10 @@ pub fn scores(
     flights: &[Reconstruction],
     horizons_s: &[f64],
 ) -> Result<Vec<HorizonScore>, ClockError> {
-    scores_with(model, flights, horizons_s, None)
-}
-
-/// As [`scores`], with the disturbance that `observer` finds before each run.
-///
-/// # Errors
-/// The sampling interval of a flight is not usable: see `ClockError`.
-pub fn scores_with(
-    model: &GreyBox,
-    flights: &[Reconstruction],
-    horizons_s: &[f64],
-    observer: Option<Observer>,
-) -> Result<Vec<HorizonScore>, ClockError> {
     let slowest = model.airframe.envelope.flying_from_mps();
     let prepared =
         flights.iter().map(|f| Prepared::new(f, slowest)).collect::<Result<Vec<_>, _>>()?;
-    let (runs, _) = free_run::fly_with(model, &prepared, horizons_s, observer);
+    let (runs, _) = free_run::fly(model, &prepared, horizons_s);
     Ok(horizons_s.iter().map(|h| runs.score(*h)).collect())
 }
 

@@ -20,7 +20,12 @@ pub(super) struct Sensors {
 
 impl Sensors {
     /// Decides from `fit`, the fit of the model `given` without added effects.
-    pub(super) fn decided(asked: SensorErrors, given: &GreyBox, fit: &Fit, judge: &Judge) -> Sensors {
+    pub(super) fn decided(
+        asked: SensorErrors,
+        given: &GreyBox,
+        fit: &Fit,
+        judge: &Judge,
+    ) -> Sensors {
         let before = given.known.installation.as_ref();
         let after = fit.model.known.installation.as_ref();
         let words = after.and_then(|after| learned::sensors_in_words(before, after));

@@ -247,8 +247,7 @@ impl Ask<'_> {
     /// `fit` of `model` with the flights' common sensor errors as the first fit has decided.
     fn with_sensors(&self, mut fit: Fit, model: &GreyBox) -> Fit {
         let asked = self.options.per_flight.sensors;
-        let decided =
-            self.sensors.get_or_init(|| Sensors::decided(asked, model, &fit, self.judge));
+        let decided = self.sensors.get_or_init(|| Sensors::decided(asked, model, &fit, self.judge));
         decided.apply(&mut fit, model);
         fit
     }

@@ -84,14 +84,14 @@ pub fn over_the_best(
     })
 }
 
-/// Means of `x` and `y` in bins of equal count over `x`.
-fn bins(y: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
+/// Means of `x` and `y` in bins of equal count over `x`, with the count, which is smaller in the last bin.
+fn bins(y: &[f64], x: &[f64]) -> Vec<[f64; 3]> {
     let mut order: Vec<usize> = (0..x.len()).collect();
     order.sort_by(|a, b| x[*a].total_cmp(&x[*b]));
     let size = order.len().div_ceil(PLACES).max(1);
     let mean =
         |bin: &[usize], of: &[f64]| bin.iter().map(|k| of[*k]).sum::<f64>() / bin.len() as f64;
-    order.chunks(size).map(|bin| [mean(bin, x), mean(bin, y)]).collect()
+    order.chunks(size).map(|bin| [mean(bin, x), mean(bin, y), bin.len() as f64]).collect()
 }
 
 /// Means of `x` and `y` in bins of equal width over the whole range of `x`. Empty bins are left out.
@@ -112,8 +112,7 @@ fn over_the_range(y: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
 fn explained(y: &[f64], x: &[f64]) -> f64 {
     let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
     let all: f64 = y.iter().map(|v| (v - mean).powi(2)).sum();
-    let size = y.len().div_ceil(PLACES).max(1) as f64;
-    let between: f64 = bins(y, x).iter().map(|[_, m]| size * (m - mean).powi(2)).sum();
+    let between: f64 = bins(y, x).iter().map(|[_, m, count]| count * (m - mean).powi(2)).sum();
     if all > 0.0 { between / all } else { 0.0 }
 }
 

@@ -45,6 +45,9 @@ pub(super) fn run_off(problem: &Problem, found: &mut Found) -> Option<()> {
     let errors: Vec<(usize, f64)> =
         contend.iter().map(|k| (*k, error(k).unwrap_or(f64::INFINITY))).collect();
     let (winner, least) = *errors.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    if least.is_infinite() {
+        return None;
+    }
     let others = errors.iter().filter(|(k, _)| *k != winner);
     let (beaten, level): (Vec<_>, Vec<_>) = others.partition(|(_, e)| *e > least + checks::CLOSE);
     let trials = |of: Vec<&(usize, f64)>| of.iter().map(|(k, _)| found.scores[*k].0).collect();

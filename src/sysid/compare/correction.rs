@@ -1,0 +1,151 @@
+//! Corrections of free runs, in which the model's rates get an additional term: a disturbance that an observer estimated before
+//! the run, or a linear function of states and deflections (a linear residual).
+
+use greylag_model::{GreyBox, Memory};
+
+use super::arx::{self, Arx};
+use super::free_run::{self, error};
+use super::result::HorizonScore;
+use crate::flight_path::reconstruction::{Instant, Reconstruction};
+use crate::weak_form::prepared::{ClockError, Prepared};
+
+/// A run uses its disturbance only if the flight holds at least this share of [`Observer::past_s`] before it.
+const LEAST_PAST: f64 = 0.5;
+
+/// A disturbance observer that estimates the disturbance once, from the flight before the start of a run. During the run it
+/// uses no measurements.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observer {
+    /// Time before the start of a run over which the model's error is averaged, s.
+    pub past_s: f64,
+    /// Time constant with which the disturbance decays during the run, s; infinite for a constant disturbance.
+    pub decay_s: f64,
+}
+
+/// Disturbance during one run, estimated from the samples before its start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Disturbance {
+    /// Rates that are added to those of the model, per second, in the order and units of `State::NAMES`. Those of roll and pitch
+    /// angle are zero, since their equations are exact.
+    rates: [f64; 8],
+    /// Factor of the decay from one sample to the next.
+    keep: f64,
+}
+
+impl Observer {
+    /// The disturbance at sample `start` of `segment`: the mean difference of measured and predicted steps over the samples
+    /// before it, divided by the sampling interval. Zero if the segment begins too shortly before `start`.
+    fn before(
+        &self,
+        model: &GreyBox,
+        flight: &Prepared,
+        segment: &[Instant],
+        start: usize,
+    ) -> Disturbance {
+        let wanted = ((self.past_s / flight.dt).round() as usize).max(1);
+        let steps = wanted.min(start);
+        let keep = (-flight.dt / self.decay_s).exp();
+        if (steps as f64) < LEAST_PAST * wanted as f64 {
+            return Disturbance { rates: [0.0; 8], keep };
+        }
+        let mut memory = Memory::default();
+        let mut rates = [0.0; 8];
+        for k in start - steps..start {
+            let next = flight.advance(
+                model,
+                segment[k].state,
+                [&segment[k], &segment[k + 1]],
+                &mut memory,
+            );
+            let missed = error(&next.to_array(), &segment[k + 1].state.to_array());
+            rates.iter_mut().zip(missed).for_each(|(sum, x)| *sum += x);
+        }
+        let time = steps as f64 * flight.dt;
+        rates = rates.map(|sum| if sum.is_finite() { sum / time } else { 0.0 });
+        rates[..2].fill(0.0);
+        Disturbance { rates, keep }
+    }
+}
+
+/// A correction of the free runs of a model.
+#[derive(Clone, Copy, Debug)]
+pub enum Correction<'a> {
+    /// A disturbance, estimated before each run.
+    Observer(Observer),
+    /// A linear residual from [`Arx::of_residual`].
+    Linear(&'a Arx),
+}
+
+/// A [`Correction`] during one run.
+pub(super) enum Acting<'a> {
+    Disturbance(Disturbance),
+    Linear {
+        arx: &'a Arx,
+        /// Predicted and, before the start of the run, measured states, the newest first.
+        past: Vec<[f64; 8]>,
+    },
+}
+
+/// Free-run errors of `model` over `flights`, one for each of `horizons_s` (s), with its rates corrected by `correction`.
+///
+/// # Errors
+/// The sampling interval of a flight is not usable: see `ClockError`.
+pub fn scores(
+    model: &GreyBox,
+    flights: &[Reconstruction],
+    horizons_s: &[f64],
+    correction: Option<Correction>,
+) -> Result<Vec<HorizonScore>, ClockError> {
+    let slowest = model.airframe.envelope.flying_from_mps();
+    let prepared =
+        flights.iter().map(|f| Prepared::new(f, slowest)).collect::<Result<Vec<_>, _>>()?;
+    let (runs, _) = free_run::fly_with(model, &prepared, horizons_s, correction);
+    Ok(horizons_s.iter().map(|h| runs.score(*h)).collect())
+}
+
+impl<'a> Correction<'a> {
+    /// The correction of a run of `model` that starts at sample `start` of `segment`.
+    pub(super) fn from(
+        &self,
+        model: &GreyBox,
+        flight: &Prepared,
+        segment: &[Instant],
+        start: usize,
+    ) -> Acting<'a> {
+        match *self {
+            Correction::Observer(observer) => {
+                Acting::Disturbance(observer.before(model, flight, segment, start))
+            }
+            Correction::Linear(arx) => {
+                Acting::Linear { arx, past: arx::past(segment, start, arx.order()) }
+            }
+        }
+    }
+}
+
+impl Acting<'_> {
+    /// Corrects `next`, the state that the model predicts one sampling interval `dt` (s) after the last sample of `flown`.
+    pub(super) fn act(&mut self, next: &mut [f64; 8], flown: &[Instant], dt: f64) {
+        match self {
+            Acting::Disturbance(disturbance) => disturbance.act(next, dt),
+            Acting::Linear { arx, past } => {
+                let rates = arx.rates(past, flown);
+                next.iter_mut().zip(rates.iter()).for_each(|(x, rate)| *x += dt * rate);
+                past.rotate_right(1);
+                past[0] = *next;
+                // roll is continuous over ±180°
+                past.iter_mut().for_each(|state| state[0] = next[0] + error(next, state)[0]);
+            }
+        }
+    }
+}
+
+impl Disturbance {
+    /// Adds the disturbance to a predicted state over one sampling interval `dt`, s, and lets it decay.
+    fn act(&mut self, state: &mut [f64; 8], dt: f64) {
+        for (x, rate) in state.iter_mut().zip(&mut self.rates) {
+            *x += dt * *rate;
+            *rate *= self.keep;
+        }
+    }
+}
