@@ -1,4 +1,5 @@
-//! Disturbance observer of free runs: the mean error of the model's accelerations just before a run is added during the run.
+//! Disturbance estimate for free runs (open-loop simulations): the mean difference between the measured rates of the states
+//! and the model's, just before a run. It is added to the model's rates during the run, and decays.
 
 use greylag_model::{GreyBox, Memory};
 
@@ -6,19 +7,21 @@ use super::free_run::error;
 use crate::flight_path::reconstruction::Instant;
 use crate::weak_form::prepared::Prepared;
 
-/// A run uses its disturbance only if the flight holds at least this share of [`Observer::past_s`] before it.
+/// Smallest fraction of [`Observer::past_s`] that must be recorded before the start of a run. With less, the disturbance is
+/// zero.
 const LEAST_PAST: f64 = 0.5;
 
-/// A disturbance observer without inputs of its own: it knows only the flight before the start of a run.
+/// A disturbance observer that estimates the disturbance once, from the flight before the start of a run. It uses no
+/// measurements during the run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observer {
-    /// Time before the start of a run over which the model's error is averaged, s.
+    /// Length of the interval before the start of a run over which the model's error is averaged, s.
     pub past_s: f64,
     /// Time constant with which the disturbance decays during the run, s; infinite for a constant disturbance.
     pub decay_s: f64,
 }
 
-/// Disturbance of a run that starts at one sample.
+/// Disturbance during one run, estimated from the samples before its start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Disturbance {
     /// Rates that are added to those of the model, per second, in the order and units of `State::NAMES`. Those of roll and pitch
@@ -29,8 +32,8 @@ pub(super) struct Disturbance {
 }
 
 impl Observer {
-    /// The disturbance at sample `start` of `segment`: the mean difference of measured and predicted steps over the samples
-    /// before it, divided by the sampling interval. Zero if the segment begins too shortly before `start`.
+    /// Estimates the disturbance for a run from sample `start` of `segment`: mean of the measured minus the predicted steps over
+    /// the samples before it, divided by the sampling interval. It is zero if too few samples precede `start`.
     pub(super) fn before(
         &self,
         model: &GreyBox,
@@ -64,7 +67,7 @@ impl Observer {
 }
 
 impl Disturbance {
-    /// Adds the disturbance to a predicted state over one sampling interval `dt`, s, and lets it decay.
+    /// Adds the disturbance of one sampling interval `dt` (s) to a predicted state. Then reduces the disturbance by its decay.
     pub(super) fn act(&mut self, state: &mut [f64; 8], dt: f64) {
         for (x, rate) in state.iter_mut().zip(&mut self.rates) {
             *x += dt * *rate;
