@@ -1,8 +1,8 @@
-//! Greylag: a MAVLink offboard autopilot companion for fixed-wing aircraft.
+//! Greylag: a companion autopilot for fixed-wing aircraft. It communicates with flight controllers and clients by MAVLink.
 //!
-//! Greylag turns commanded roll and pitch into actuator outputs with a grey-box model of the aircraft. The modules
-//! below are declared in the order of their layers. Each layer may use only the layers above it;
-//! `tests/house/architecture.rs` checks this order. Each layer is a separate crate, `greylag-num` to
+//! Greylag turns commanded roll and pitch into actuator outputs with a grey-box model of the aircraft: a physical prior
+//! plus a learned residual. The modules below are declared in the order of their layers. Each layer may use only the layers
+//! above it; `tests/house/architecture.rs` checks this order. Each layer is a separate crate, `greylag-num` to
 //! `greylag-workbench`.
 //!
 //! ```text
@@ -19,11 +19,11 @@
 //!
 //! # One tick
 //!
-//! [`link::vehicle`] decodes a state frame into telemetry. [`flight::pilot::Pilot::observe`] turns the telemetry into
-//! an observation with a target inside the envelope. A [`control::Controller`] computes a command.
-//! [`flight::pilot::Pilot::decide`] takes this command or the fallback's and limits the slew rate of surfaces and
-//! throttle. The link sends the result. The pilot uses no socket and no clock: the same telemetry gives the same
-//! commands.
+//! A tick is a control cycle of 10 ms. [`link::vehicle`] decodes a state frame into telemetry.
+//! [`flight::pilot::Pilot::observe`] turns the telemetry into an observation with a target inside the envelope. A
+//! [`control::Controller`] computes a command. [`flight::pilot::Pilot::decide`] takes this command or that of a fallback
+//! controller and limits the slew rate of surfaces and throttle. The link sends the result. The pilot uses no socket and no
+//! clock: the same telemetry gives the same commands.
 //!
 //! # From the paper to the code
 //!
@@ -88,11 +88,11 @@ pub use greylag_flight as flight;
 // System identification: finds missing effects in a log.
 pub use greylag_sysid as sysid;
 
-// Simulated and imagined flights with their scores.
+// Flights simulated in JSBSim or in a model, with their scores.
 #[cfg(any(feature = "demo", feature = "learn"))]
 pub use greylag_sim as sim;
 
-// Training. Only this layer uses burn.
+// Training of models and policies. Only this layer uses the machine-learning library burn.
 #[cfg(feature = "learn")]
 pub use greylag_learn as learn;
 
@@ -100,10 +100,10 @@ pub use greylag_learn as learn;
 #[cfg(feature = "study")]
 pub use greylag_campaign as campaign;
 
-// Reports as pages.
+// Reports as HTML pages.
 pub use greylag_report as report;
 
-// The workbench in a browser.
+// The workbench: identification and flights in a browser.
 #[cfg(feature = "study")]
 pub use greylag_workbench as workbench;
 

@@ -1,4 +1,5 @@
-//! Errors of planning, reading and writing campaigns.
+//! Errors of planning, reading and writing campaigns. A campaign is a planned set of runs of this program, for example one
+//! run for each model and seed.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -6,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// A campaign cannot be planned, read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
-    /// The campaign file cannot be read by the operating system.
+    /// The operating system cannot read the campaign file.
     #[error("cannot read campaign file {path}: {source}; name a file such as params/campaigns/small.toml", path = path.display())]
     Read {
         /// Path of the file.
@@ -43,12 +44,12 @@ pub enum CampaignError {
 }
 
 impl CampaignError {
-    /// Converts an I/O error of the operation `doing` on `path`.
+    /// Returns a function that turns an I/O error of the operation `doing` on `path` into a [`CampaignError::Io`].
     pub(super) fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> CampaignError {
         move |source| CampaignError::Io { doing, path: path.into(), source }
     }
 
-    /// An error for the file `path` with wrong contents; `why` completes a sentence that begins with the path.
+    /// The error for a file `path` with wrong contents. `why` completes a sentence that begins with the path.
     pub(super) fn content(path: &Path, why: impl ToString) -> CampaignError {
         CampaignError::Content { path: path.into(), why: why.to_string() }
     }

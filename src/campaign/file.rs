@@ -1,4 +1,7 @@
 //! The campaign file: axes, seeds, stages, tables and claims.
+//!
+//! A campaign runs commands of this program many times. An axis is a varied setting, for example the controller. Its
+//! levels are the values of the setting. A cell is one command line with one combination of levels.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -34,7 +37,7 @@ pub struct CampaignFile {
     /// Tables of summary statistics.
     #[serde(default, rename = "table")]
     pub tables: Vec<TableFile>,
-    /// Claims that the results are tested against.
+    /// Claims that are tested with the results.
     #[serde(default, rename = "claim")]
     pub claims: Vec<ClaimFile>,
     /// SHA-256 of the file.
@@ -68,21 +71,22 @@ impl From<LevelFile> for Level {
     }
 }
 
-/// A stage: one command, run for every combination of the levels of its axes. One such run is a cell.
+/// A stage: one command, run for every combination of the levels of its axes. Each run is a cell.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StageFile {
-    /// Name of the stage. `{name}` in the command of a later stage is replaced by the output folder of this stage.
+    /// Name of the stage. The command of a later stage refers to the output of this stage by the placeholder `{name}`.
     pub name: String,
     /// The axes that the stage varies.
     pub over: Vec<String>,
-    /// The command line without `greylag`. Its placeholders are `{out}` (the cell's folder), `{seed}`, `{axis}` (the
-    /// level of an axis) and `{stage}` (the folder of an earlier stage's cell).
+    /// The command line without `greylag`. It may contain placeholders in braces. `{out}` stands for the output folder of
+    /// the cell, `{seed}` for its seed. The name of an axis stands for the words of the cell's level. The name of an earlier
+    /// stage stands for the output folder of its cell with the same levels.
     pub command: String,
-    /// Further input files, which the command line does not name.
+    /// Input files that the command reads although the command line does not name them.
     #[serde(default)]
     pub inputs: Vec<String>,
-    /// Estimated processor time of a cell, core seconds, for cells without a measured time.
+    /// Estimated processor time of one cell, s, summed over cores. It is used until the time of a cell has been measured.
     pub core_seconds: Option<f64>,
 }
 
@@ -92,20 +96,22 @@ pub struct StageFile {
 pub struct TableFile {
     /// Title of the table.
     pub title: String,
-    /// The stage whose cells the table summarises, and the levels that these cells must have: `stage axis=level …`.
+    /// The cells that the table summarises: the name of their stage, then the levels that they must have, in the form
+    /// `stage axis=level …`.
     pub stage: String,
-    /// Axes that form the rows. All other axes except the seed divide the cells of a row into strata.
+    /// The table has one row for each combination of the levels of these axes. All other axes except the seed divide the
+    /// cells of a row into strata, which the bootstrap resamples separately.
     pub rows: Vec<String>,
-    /// Names of the quantities in a result, such as `easy.mean_deg`.
+    /// Names of the summarised quantities in the cells' results, such as `easy.mean_deg`.
     pub metrics: Vec<String>,
     /// Unit of the quantities as text; may be empty.
     #[serde(default)]
     pub unit: String,
-    /// The published table for comparison, one of those in [`super::published`]; `None` without comparison.
+    /// Id of the published table in [`super::published`] to compare with; `None` without comparison.
     pub paper: Option<String>,
 }
 
-/// A claim: a quantity is smaller in one group of cells than in another.
+/// A claim: the mean of a quantity is smaller over one group of cells than over another.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClaimFile {
@@ -113,9 +119,9 @@ pub struct ClaimFile {
     pub says: String,
     /// Name of the quantity.
     pub metric: String,
-    /// Stage and levels of the cells claimed to be smaller: `stage axis=level …`.
+    /// The group that is claimed to have the smaller mean, as stage and levels: `stage axis=level …`.
     pub less: String,
-    /// Stage and levels of the cells for comparison: `stage axis=level …`.
+    /// The group that is claimed to have the larger mean, in the same form.
     pub than: String,
 }
 
@@ -132,7 +138,7 @@ impl CampaignFile {
         CampaignFile::parse(&text).map_err(|why| CampaignError::File { path: path.into(), why })
     }
 
-    /// Parses and checks the text of a campaign file. The error describes the fault.
+    /// Parses and checks the text of a campaign file. The error is a text that describes the fault.
     ///
     /// # Errors
     ///
@@ -231,7 +237,7 @@ impl CampaignFile {
         })
     }
 
-    /// The stage and the levels that `text` names: `stage axis=level …`.
+    /// Parses `text` of the form `stage axis=level …`. Returns the name of the stage, and the level of each axis in `text`.
     ///
     /// # Errors
     /// If there is no such stage, axis or level, or if the stage does not vary the axis.
@@ -261,7 +267,7 @@ impl CampaignFile {
         }
     }
 
-    /// The levels of `axis`; for the seed axis, the seeds. Empty for an unknown axis.
+    /// The levels of `axis`. The levels of the seed axis are the seeds. An unknown axis has no levels.
     pub fn levels(&self, axis: &str) -> Vec<Level> {
         if axis != SEED {
             return self.axes.get(axis).cloned().unwrap_or_default();
@@ -271,7 +277,7 @@ impl CampaignFile {
     }
 }
 
-/// Parses levels written as `axis=level`.
+/// Parses words of the form `axis=level`. Returns the level of each axis.
 pub(super) fn levels<'a>(
     words: impl Iterator<Item = &'a str>,
 ) -> Result<BTreeMap<String, String>, String> {

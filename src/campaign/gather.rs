@@ -1,4 +1,6 @@
 //! Collects the results of a campaign's cells and lists the cells without a result.
+//!
+//! A cell is one run of a stage's command at one combination of the levels of the campaign's axes.
 
 use std::path::Path;
 
@@ -14,13 +16,13 @@ pub struct Gathered {
     pub records: Vec<Record>,
     /// Computing times of the finished cells, as far as recorded. [`Times::cell`] is the id of the cell.
     pub times: Vec<Times>,
-    /// Ids of the failed cells, with the reasons.
+    /// Ids of the cells that failed permanently, with the reasons.
     pub failed: Vec<(String, Failure)>,
     /// Ids of the cells that have started and have no result.
     pub begun: Vec<String>,
-    /// Ids of the cells that only have a result of another command or of other inputs.
+    /// Ids of the cells without a valid result that have a result of another command, input or program version on disk.
     pub stale: Vec<String>,
-    /// Ids of the cells that have not started.
+    /// Ids of the cells that have not started and have no such old result.
     pub missing: Vec<String>,
 }
 
@@ -31,9 +33,9 @@ pub struct Joined {
     pub taken: usize,
     /// Number of results that were not imported because their cells already have a result with equal measurements.
     pub twice: usize,
-    /// Ids of the cells that already have a result with different measurements.
+    /// Ids of the cells whose present result has other measurements than the result that was to be imported.
     pub differing: Vec<String>,
-    /// Number of results that belong to no cell of the plan, or to another command or input.
+    /// Number of results that fit no cell of the plan, because the id, the command, an input or the program version differs.
     pub foreign: usize,
 }
 
@@ -41,7 +43,7 @@ pub struct Joined {
 ///
 /// # Errors
 ///
-/// If a file of the campaign's folder cannot be read or belongs to another cell.
+/// If a result, a failure record or a time record exists and cannot be read, or if a result belongs to another cell.
 pub fn gather(plan: &Plan, store: &Store) -> Result<Gathered, CampaignError> {
     let mut all = Gathered::default();
     for cell in &plan.cells {
@@ -66,10 +68,9 @@ impl Gathered {
         Ok(())
     }
 
-    /// Imports the results `others`, for instance those of another machine. They are used for the cells of `plan` that have
-    /// no local result.
+    /// Imports the results `others`, for instance those of another machine, for the cells of `plan` that have no result yet.
     ///
-    /// Results of another command or input are not imported. If a cell has a local result too, the local result is kept.
+    /// A present result is never replaced. A result of another command, input or program version is not imported.
     pub fn join(&mut self, plan: &Plan, others: Vec<Record>) -> Joined {
         let mut joined = Joined::default();
         for other in others {
@@ -103,7 +104,7 @@ impl Gathered {
     }
 }
 
-/// Writes `lines` to a file, one line of JSON each.
+/// Writes `lines` to a file, each as one line of JSON.
 ///
 /// # Errors
 /// If a line cannot be written as JSON, or the file cannot be written.
@@ -162,7 +163,7 @@ mod tests {
         plan(file, Path::new("a.toml"), &|path: &Path| PathBuf::from(path)).unwrap()
     }
 
-    /// Sets a cell's result to `value`.
+    /// Claims `cell` and stores a result whose measurement `easy.mean_deg` is `value`.
     fn finish(store: &Store, cell: &Cell, value: f64) {
         let claimed = store.claim(cell).unwrap().unwrap();
         assert!(store.claim(cell).unwrap().is_none(), "a cell is run by one process");
@@ -216,14 +217,14 @@ mod tests {
         let summary = &summaries(&planned_first.file, &all.records)[0];
         assert_eq!(summary.rows[1].ours.mean.value, 12.0);
         assert_eq!(summary.rows[1].runs[2].cell, "last/y/3");
-        // a table of the cells at one level of an axis
+        // a table can be restricted to the cells at one level of an axis
         let mut chosen = planned_first.file.clone();
         (chosen.tables[0].stage, chosen.tables[0].rows) = ("last kind=y".into(), Vec::new());
         let summary = &summaries(&chosen, &all.records)[0];
         assert_eq!((summary.rows.len(), summary.rows[0].ours.mean.value), (1, 12.0));
         let found = &findings(&planned_first.file, &all.records).unwrap()[0];
         assert_eq!(found.outcome, Outcome::Holds, "{}", found.because);
-        // six cells of one seed do not show the spread over seeds
+        // if all cells have the same seed, they do not show the spread over seeds
         let mut one = all.records.clone();
         one.iter_mut().for_each(|record| record.seed = Some(1));
         let found = &findings(&planned_first.file, &one).unwrap()[0];
@@ -232,9 +233,9 @@ mod tests {
         assert_eq!(found.outcome, Outcome::NoData);
         assert_eq!(found.because, "no cell of last kind=y has easy.mean_deg");
 
-        // results of another machine for cells without a local result
+        // results of another machine are imported for cells without a result
         let (mut partly, mut elsewhere) = (all.clone(), all.records.clone());
-        // an inexact decimal parser would change the last bit of this value
+        // a decimal parser that rounds inexactly would change the last bit of this value
         elsewhere[1].metrics.insert("easy.mean_deg".to_owned(), 0.001_848_630_997_957_734_2);
         write_lines(&path, &elsewhere).unwrap();
         assert_eq!(read_lines(&path).unwrap(), elsewhere);
@@ -249,7 +250,7 @@ mod tests {
         assert_eq!(partly.missing, [absent[6].cell.as_str()]);
         assert_eq!(partly.records, all.records[..8]);
 
-        // another input changes the identities of the cells: the old results are stale
+        // another input changes the identities of the cells, so that the old results are stale
         std::fs::write(&input, "2").unwrap();
         let planned_again = planned(&input);
         finish(&store, &planned_again.cells[0], 0.0);

@@ -1,4 +1,5 @@
-//! Extracts measured quantities and hashes of output files from the folder of a finished command.
+//! Reads the output of a campaign's cell. A cell is one run of a command with one combination of settings. Its command
+//! writes its output files into the cell's folder.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,16 +11,16 @@ use greylag_model::residual::hash;
 
 /// Name of the file with the scores that `greylag evaluate` writes to a cell's folder.
 pub const SCORES: &str = "evaluation.json";
-/// Name of the report that `greylag train dynamics` writes.
+/// Name of the file with the model errors that `greylag train dynamics` writes.
 const TRAINING: &str = "training.json";
 /// Name of the learning curve that `greylag train policy` writes.
 const CURVE: &str = "curve.csv";
-/// Columns of a learning curve that do not depend on the speed of the machine.
+/// The columns of a learning curve that are read. They do not depend on the speed of the machine.
 const COLUMNS: [&str; 5] = ["steps", "easy_deg", "hard_deg", "divergence_rate", "reward"];
-/// Suffixes of the files that later cells read.
+/// File extensions of the output that later cells read. Only files with these extensions are hashed.
 const READ_LATER: [&str; 3] = ["safetensors", "toml", "csv"];
-/// Files that are not hashed. The learning curve contains computing times, which differ between runs. The checkpoint is
-/// read only by the same cell.
+/// Files that are not hashed in spite of their extension. The learning curve contains computing times, which differ between
+/// runs. The checkpoint is read only by the same cell.
 const OWN: [&str; 2] = ["checkpoint.safetensors", CURVE];
 
 /// Output of a cell.
@@ -53,7 +54,8 @@ pub fn harvest(folder: &Path) -> Result<Harvest, CampaignError> {
     Ok(harvest)
 }
 
-/// The scores by name, such as `easy.mean_deg`. With several controllers, the controller's name is the prefix.
+/// Scores of an evaluation by name. A name has the form `GROUP.SCORE`, such as `easy.mean_deg`; a group is a set of target
+/// attitudes. If several controllers were evaluated, the name starts with that of the controller.
 fn evaluated(document: &Value) -> Vec<(String, f64)> {
     let controllers = list(document, "controllers");
     let mut all = Vec::new();
@@ -81,8 +83,8 @@ fn evaluated(document: &Value) -> Vec<(String, f64)> {
     all
 }
 
-/// Quality measures over the targets of a group, with their names. For example, `easy.surface_travel` is the median over the
-/// targets, and `easy.load_factor_max.worst` is the worst value.
+/// The group's quality measures by name. For example, `easy.surface_travel` is the median over the targets of the group, and
+/// `easy.load_factor_max.worst` is the worst value over them. `before` is the first part of the names.
 fn measured(measures: &Value, before: &str) -> Vec<(String, f64)> {
     let mut all = Vec::new();
     for (id, spread) in measures.as_object().into_iter().flatten() {
@@ -93,8 +95,9 @@ fn measured(measures: &Value, before: &str) -> Vec<(String, f64)> {
     all
 }
 
-/// Errors of open-loop simulations with the learned model and with its prior on test flights, for each simulated number of
-/// steps. The median relative error of the coefficients is included if their true values are known.
+/// Errors of open-loop simulations of the test flights after different numbers of steps, for the learned model and for its
+/// prior (the model before learning): normalised RMS error, median error and fraction of diverged simulations. If the true
+/// coefficients are known, the median relative error of the learned coefficients is added.
 fn trained(document: &Value) -> Vec<(String, f64)> {
     let mut all = Vec::new();
     for (who, before) in [("learned", ""), ("prior", "prior.")] {
@@ -140,7 +143,7 @@ fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>, CampaignError> {
     let mut columns: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for row in reader.deserialize() {
         let row: BTreeMap<String, f64> = row.map_err(wrong)?;
-        // NaN marks a value that was not measured; JSON cannot represent NaN, so the row is omitted
+        // NaN marks a value that was not measured. JSON cannot represent NaN, so the whole row is omitted
         let finite = |x: &f64| x.is_finite();
         if !COLUMNS.iter().all(|column| row.get(*column).is_some_and(finite)) {
             continue;
@@ -152,7 +155,8 @@ fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>, CampaignError> {
     Ok(columns)
 }
 
-/// SHA-256 of the files that later cells read. A folder has one hash over its files.
+/// SHA-256 of the files that later cells read, by file name. A subfolder has a single hash, computed from the names and
+/// hashes of its files.
 fn files(folder: &Path) -> Result<BTreeMap<String, String>, CampaignError> {
     let mut all = BTreeMap::new();
     for path in sorted(folder)? {

@@ -1,11 +1,12 @@
 //! Scripts that submit a campaign to a scheduler.
 //!
-//! Each stage is a job array. Each job runs `greylag campaign run FILE --cell N`.
+//! A campaign runs in stages, one after the other. Each stage has cells: runs of one command with different parameters.
+//! A script submits the cells of a stage as one array of jobs. Each job runs `greylag campaign run FILE --cell N`.
 
 use super::file::StageFile;
 use super::plan::Plan;
 
-/// Scheduler of the jobs.
+/// Schedulers for which scripts are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Launcher {
     /// Job arrays of Slurm.
@@ -19,13 +20,14 @@ pub enum Launcher {
 /// Values that are inserted into a script.
 #[derive(Clone, Debug)]
 pub struct Job {
-    /// Path of the program.
+    /// Path of the program `greylag`.
     pub program: String,
     /// Path of the campaign file.
     pub file: String,
-    /// Path of the campaign's folder.
+    /// Path of the campaign's output folder.
     pub out: String,
-    /// Largest number of attempts at a cell that fails temporarily (exit status 75).
+    /// Largest number of attempts at a cell. An attempt is repeated after exit status 75 (a later attempt may succeed), and
+    /// if a signal ended the process.
     pub attempts: usize,
     /// Further options of the scheduler, such as a partition and a time limit.
     pub options: String,
@@ -53,7 +55,7 @@ pub fn script(launcher: Launcher, plan: &Plan, job: &Job) -> String {
         .replace("@STAGES@", stages.trim_end())
 }
 
-/// The script's line for a stage: its name, and the numbers of its first and last cell.
+/// The script's line for a stage: the stage's name, and the numbers of its first and last cell.
 fn line(plan: &Plan, stage: &StageFile) -> String {
     let numbers: Vec<usize> = plan.of_stage(&stage.name).map(|cell| cell.number).collect();
     let (first, last) = (numbers.first().unwrap_or(&0), numbers.last().unwrap_or(&0));

@@ -1,12 +1,14 @@
-//! Campaigns: many runs of this program over priors, controllers and seeds, with statistics over them.
+//! Campaigns: many runs of this program with different aircraft models, controllers and random seeds, and the statistics
+//! of their results.
 //!
-//! A campaign file names axes, seeds and stages. [`plan`](plan()) expands it into *cells*: command lines of this
-//! program, each with an identity derived from its command, its input files and the cells before it. [`store`] keeps
-//! the result of each cell as one JSON line, written atomically. [`gather`] collects these lines, and [`tables`]
-//! summarises them over seeds.
+//! A campaign file lists stages (commands of this program), axes (the factors that are varied, such as the controller)
+//! and seeds. [`plan`](plan()) expands it into *cells*. A cell is the command line of one stage for one combination of
+//! axis levels and seed. Its identity is a hash of the command, its input files and the cells that it reads. [`store`]
+//! keeps the result of each cell as one JSON line, written atomically. [`gather`] collects these lines, and [`tables`]
+//! summarises them over the seeds.
 //!
-//! This crate runs no cells. `greylag campaign run` runs them. A cluster's scheduler can call this command
-//! ([`launch`]).
+//! This crate does not run the cells; `greylag campaign run` does. [`launch`] writes scripts that submit this command to
+//! the scheduler of a cluster.
 
 pub mod cell;
 pub mod error;

@@ -1,4 +1,7 @@
-//! Expands a campaign file into cells.
+//! Expands a campaign file into cells, the single runs of a campaign.
+//!
+//! The file lists stages and axes. A stage is a command with placeholders. An axis is a quantity that is varied, such as the
+//! seed, and its values are called levels. A cell is the command of one stage with one level of each axis that it varies.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,24 +12,24 @@ use super::file::{CampaignFile, Level, StageFile, levels};
 use greylag_model::GreyBox;
 use greylag_model::residual::hash;
 
-/// Placeholder for the cell's output folder in a stage's command.
+/// Placeholder in a stage's command. It stands for the output folder of the cell.
 const OWN: &str = "{out}";
 
 /// A campaign with its cells.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// The campaign file.
+    /// Contents of the campaign file.
     pub file: CampaignFile,
-    /// The cells in order: each cell follows the cells whose folders it reads.
+    /// The cells, ordered so that each cell stands after the cells whose folders it reads.
     pub cells: Vec<Cell>,
 }
 
-/// Expands `file`, which was read from `path`, into cells. `find` returns the location of a file that a command names.
+/// Expands `file`, which was read from `path`, into cells. `find` maps a path in a command to the path of the existing file.
 ///
 /// # Errors
 ///
 /// If a command has an unknown placeholder, or names a file that does not exist or cannot be read, or if two cells of a stage
-/// have the same command.
+/// have different seeds and the same command.
 pub fn plan(
     file: CampaignFile,
     path: &Path,
@@ -57,8 +60,8 @@ pub fn plan(
     Ok(Plan { file, cells })
 }
 
-/// Checks that no cell of the same stage with another seed has the command and the inputs of `new`. Otherwise copies of one
-/// result would count as several seeds. Cells that differ only in other levels may have the same command.
+/// Checks that no cell of `cells` has the stage, the command and the inputs of `new` but another seed. Otherwise copies of one
+/// result would count as results of several seeds. Cells with the same seed may have the same command.
 fn distinct(cells: &[Cell], new: &Cell) -> Result<(), String> {
     let same = |cell: &&Cell| {
         cell.stage == new.stage
@@ -123,7 +126,7 @@ impl Draft<'_> {
         let (mut words, mut after) = (Vec::new(), Vec::new());
         for word in self.stage.command.split_whitespace() {
             match self.level_of(word) {
-                // a level may insert several words, or none
+                // the text of a level may be several words or none
                 Some(level) => {
                     for word in level.words.split_whitespace() {
                         words.push(self.word(word, &mut after)?);
@@ -142,7 +145,7 @@ impl Draft<'_> {
         self.levels.iter().find(|(name, _)| name == axis).map(|(_, level)| level)
     }
 
-    /// A word with its placeholders substituted.
+    /// Returns `word` with its placeholders substituted. Adds the numbers of the cells whose folders it names to `after`.
     fn word(&self, word: &str, after: &mut Vec<usize>) -> Result<String, String> {
         let (mut text, mut rest) = (String::new(), word);
         while let Some(start) = rest.find('{') {
@@ -160,8 +163,8 @@ impl Draft<'_> {
         Ok(text + rest)
     }
 
-    /// Folder of an earlier stage's cell. `name` is `stage`, or `stage:axis=level,…` with levels that replace those of
-    /// the present cell.
+    /// Returns the folder of a cell of an earlier stage, and adds the number of that cell to `after`. `name` is `stage` or
+    /// `stage:axis=level,…`. The cell has the levels given in `name`, and otherwise the levels of the present cell.
     fn upstream(&self, name: &str, after: &mut Vec<usize>) -> Result<String, String> {
         let (stage, chosen) = name.split_once(':').unwrap_or((name, ""));
         let given = levels(chosen.split(',').filter(|part| !part.is_empty()))?;
@@ -213,8 +216,8 @@ fn cell(
     cell
 }
 
-/// Input files of a command: its words that contain a slash, except folders of the campaign, and the additional inputs of
-/// its stage.
+/// Input files of a command: the words that contain a slash, and the additional inputs of the stage. Words with a folder of
+/// the campaign are excluded.
 fn named_files(words: &[String], stage: &StageFile) -> Vec<String> {
     let named = words.iter().filter(|w| w.contains('/') && !w.contains(OUT) && !w.contains(OWN));
     // in `--env model:FOLDER` the path follows the colon
@@ -222,7 +225,7 @@ fn named_files(words: &[String], stage: &StageFile) -> Vec<String> {
     named.map(path).chain(stage.inputs.iter().cloned()).collect()
 }
 
-/// SHA-256 of a file, of all files in a folder, or of a model with all files that the model reads.
+/// SHA-256 of a file, or of all files in a folder. For a model file, the SHA-256 also covers the files that the model reads.
 fn content(path: &Path) -> Result<String, String> {
     let cannot = |e: std::io::Error| format!("cannot read {}: {e}", path.display());
     if path.extension().is_some_and(|e| e == "toml")

@@ -1,8 +1,9 @@
-//! Published statistics over seeds from \[GSFM26\], for comparison with a campaign.
+//! Statistics over seeds that \[GSFM26\] (T. Guerin et al., 2026, see `src/lib.rs`) publishes. A campaign, a planned set of
+//! runs of this program, is compared with them.
 //!
-//! `published.csv` contains Tables IV, VIII, IX, X (which includes Table III) and XI of \[GSFM26\] as printed. Rows
-//! have the names of campaign levels, such as `severe/trainable`, `parallel` and `hybrid`. Target groups have the names
-//! that `greylag evaluate` gives them.
+//! `published.csv` contains Tables IV, VIII, IX, X (which includes Table III) and XI of \[GSFM26\] as printed. Its column
+//! `row` names settings as campaign files do, such as `severe/trainable`, `parallel` and `hybrid`. Its column `targets`
+//! names groups of target attitudes as `greylag evaluate` does.
 
 use std::sync::LazyLock;
 
@@ -35,9 +36,9 @@ pub fn tables() -> Vec<&'static str> {
     tables
 }
 
-/// Published median, interquartile mean and mean of the quantity `metric` in one row of a table; `None` for a statistic
-/// that is not published. Quantities such as `easy.mean_deg` are in degrees. Quantities such as `easy.divergence_rate` are
-/// fractions, and only their mean is published.
+/// Published median, interquartile mean and mean of the quantity `metric`, for the setting `row` in a table. A statistic
+/// that is not published is `None`. `metric` is a target group and a quantity. The quantity `mean_deg` is an error in
+/// degrees. The quantity `divergence_rate` is a fraction, of which only the mean is published.
 pub fn published(table: &str, row: &str, metric: &str) -> [Option<Estimate>; 3] {
     let (targets, quantity) = metric.rsplit_once('.').unwrap_or(("", metric));
     let find = |statistic: &str| {
@@ -62,7 +63,7 @@ mod tests {
 
     #[test]
     fn every_line_is_read_and_lies_in_its_interval() {
-        // rows with three statistics: 15 in IV and in XI, 18 in X, 9 in IX; rows with one statistic: 15 in VIII
+        // Tables IV and XI have 15 entries each, X has 18 and IX has 9, all with three statistics; VIII has 15 with one statistic
         assert_eq!(LINES.len(), 3 * (15 + 15 + 18 + 9) + 15);
         assert_eq!(tables(), ["X", "IX", "XI", "IV", "VIII"]);
         for Line { table, row, estimate: Estimate { value, ci95: [low, high] }, .. } in LINES.iter()

@@ -1,14 +1,15 @@
-//! Statistics over seeds: median, interquartile mean and mean, each with its 95 % confidence interval.
+//! Statistics over runs with different seeds: median, interquartile mean and mean, each with its 95 % confidence interval.
 //!
-//! The method follows rliable (Agarwal et al. 2021). The interquartile mean omits a quarter of all runs at each end.
-//! Intervals are percentiles of a bootstrap that draws seeds with replacement within each stratum (task). One
-//! definition differs from rliable: the median is taken over all runs, not over the means of the tasks. \[GSFM26\] does
-//! not specify which median its tables contain.
+//! The method follows the package rliable (Agarwal et al. 2021). The interquartile mean omits the smallest and the largest
+//! quarter of all scores. Intervals are percentiles of a bootstrap that draws runs with replacement within each stratum. A
+//! stratum is a task: the runs that differ only in their seed. One definition differs from rliable: the median is taken
+//! over all runs, not over the means of the tasks. The paper \[GSFM26\] (see `src/lib.rs`) does not say which of the two
+//! medians its tables contain.
 
 use greylag_num::bootstrap;
 use greylag_num::statistics::{interquartile_mean, mean, quantile};
 
-/// Seed of the bootstrap. It is constant, so the same runs give the same intervals.
+/// Seed of the bootstrap's random numbers. It is constant, so that the same runs give the same intervals.
 const SEED: u64 = 95;
 
 /// A statistic with its confidence interval.
@@ -20,24 +21,25 @@ pub struct Estimate {
     pub ci95: [f64; 2],
 }
 
-/// Summary of several runs.
+/// Summary of the scores of several runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aggregate {
     /// Number of runs.
     pub count: usize,
-    /// Median over the runs.
+    /// Median of the scores.
     pub median: Estimate,
-    /// Interquartile mean over the runs.
+    /// Interquartile mean of the scores.
     pub iqm: Estimate,
-    /// Mean over the runs.
+    /// Mean of the scores.
     pub mean: Estimate,
-    /// Smallest of the runs.
+    /// Smallest of all scores.
     pub min: f64,
-    /// Largest of the runs.
+    /// Largest of all scores.
     pub max: f64,
 }
 
-/// Summarises all runs. `strata` has one vector for each task, with one score for each seed. `None` if there are no runs.
+/// Summarises the scores of all runs. `strata` has one vector for each task, with one score for each seed. `None` if there
+/// are no runs.
 pub fn aggregate(strata: &[Vec<f64>]) -> Option<Aggregate> {
     let runs: Vec<f64> = strata.concat();
     let estimate = |statistic: &dyn Fn(&[f64]) -> f64| Estimate {
@@ -54,7 +56,7 @@ pub fn aggregate(strata: &[Vec<f64>]) -> Option<Aggregate> {
     })
 }
 
-/// Mean of `b` minus mean of `a`, with `a` and `b` resampled independently. `None` if either is empty.
+/// Mean of `b` minus mean of `a`. For the interval, `a` and `b` are resampled independently. `None` if either is empty.
 pub fn difference(a: &[f64], b: &[f64]) -> Option<Estimate> {
     if a.is_empty() || b.is_empty() {
         return None;
@@ -65,8 +67,8 @@ pub fn difference(a: &[f64], b: &[f64]) -> Option<Estimate> {
     Some(Estimate { value: gap(&strata.concat()), ci95 })
 }
 
-/// Mean of paired differences. `strata` has the differences of each stratum. The strata are resampled separately. `None` if
-/// there are no pairs.
+/// Mean of paired differences. `strata` has one vector of differences for each stratum. For the interval, each stratum is
+/// resampled separately. `None` if there are no pairs.
 pub fn paired_difference(strata: &[Vec<f64>]) -> Option<Estimate> {
     let gaps = strata.concat();
     if gaps.is_empty() {
@@ -89,7 +91,7 @@ mod tests {
         assert_eq!(all.count, 10);
         for (value, wanted) in [
             (all.median.value, 1.0),
-            // scipy omits int(0.25 · 10) = 2 runs at each end; the mean is that of 0.85 0.91 0.95 1.05 1.1 1.2
+            // scipy omits int(0.25 · 10) = 2 runs at each end and averages 0.85, 0.91, 0.95, 1.05, 1.1 and 1.2
             (all.iqm.value, 6.06 / 6.0),
             (all.mean.value, 1.126),
             (all.min, 0.6),
@@ -102,8 +104,8 @@ mod tests {
         }
     }
 
-    /// The two tasks differ by 10, and within a task all seeds agree. Resampling across tasks would give the mean an
-    /// interval several units wide.
+    /// The scores of the two tasks differ by 10. Within a task all scores are equal. Resampling across tasks would give the
+    /// mean an interval several units wide.
     #[test]
     fn strata_keep_the_difference_of_tasks_out_of_the_interval() {
         let all = aggregate(&[vec![1.0; 5], vec![11.0; 5]]).unwrap();

@@ -1,4 +1,7 @@
 //! A campaign on disk: each cell has a folder with one result, which is written atomically.
+//!
+//! A cell is one run of a stage's command at one combination of the levels of the campaign's axes. Its identity is a hash over
+//! the program version, the command and the input files.
 
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -28,15 +31,15 @@ pub struct Store {
 /// State of a cell.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Standing {
-    /// It has a result.
+    /// The cell has a result.
     Done(Box<Record>),
-    /// It failed permanently: another run would fail as well.
+    /// The cell failed permanently: another run would fail as well.
     Failed(Failure),
-    /// It has started and has no result: it is running or was interrupted.
+    /// The cell has started and has no result: it is running or was interrupted.
     Begun,
-    /// Only a result of another command or of other inputs exists, which is not valid for this cell.
+    /// The cell has no result, but an old result of another command, input or program version exists.
     Stale,
-    /// It has not started.
+    /// The cell has not started, and no old result exists.
     Missing,
 }
 
@@ -54,11 +57,11 @@ pub struct Failure {
 pub struct Times {
     /// Id of the cell.
     pub cell: String,
-    /// Wall time of the session that finished the cell, s.
+    /// Wall time of the process that finished the cell, s.
     pub seconds: f64,
-    /// Processor time of that session over all cores, s.
+    /// Processor time of that process over all cores, s.
     pub core_seconds: f64,
-    /// Whether an earlier session had started the cell. If so, the times exclude that session.
+    /// Whether an earlier process had started the cell. If so, the times exclude the earlier process.
     pub resumed: bool,
     /// Time at which the cell ended, s since 1970-01-01 UTC.
     pub ended_unix_s: u64,
@@ -68,12 +71,12 @@ pub struct Times {
     pub program: String,
 }
 
-/// Exclusive lock on a cell among all processes that share the disk, on any machine.
+/// Exclusive lock on a cell: no other process that uses the same campaign folder runs this cell.
 #[derive(Debug)]
 pub struct Claimed {
     /// Folder of the cell.
     pub folder: PathBuf,
-    /// Whether an earlier session had started the cell.
+    /// Whether an earlier process had started the cell.
     pub resumed: bool,
     _lock: File,
 }
@@ -119,7 +122,7 @@ impl Store {
         Ok(if self.has_other(cell) { Standing::Stale } else { Standing::Missing })
     }
 
-    /// Whether a result with another identity exists for the stage and levels of `cell`.
+    /// Whether the stage and levels of `cell` have a result with another identity.
     fn has_other(&self, cell: &Cell) -> bool {
         let (stem, own) = (cell.stem() + "-", cell.folder());
         let Ok(entries) = std::fs::read_dir(&self.folder) else { return false };
@@ -131,7 +134,7 @@ impl Store {
         })
     }
 
-    /// Locks a cell, marks it as started and removes an earlier failure record. `None` while another process holds the
+    /// Locks a cell, marks it as started and removes an earlier failure record. Returns `None` if another process holds the
     /// lock.
     ///
     /// # Errors
@@ -195,13 +198,13 @@ fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option<T>, Campai
     serde_json::from_str(&text).map(Some).map_err(wrong)
 }
 
-/// Writes a document in one line, atomically.
+/// Writes `document` atomically as one line of JSON.
 fn write<T: Serialize>(path: &Path, document: &T) -> Result<(), CampaignError> {
     let line = serde_json::to_string(document).map_err(|e| CampaignError::content(path, e))?;
     whole(path, line + "\n")
 }
 
-/// Writes a temporary file in the same folder and renames it to the final name.
+/// Writes `text` to a temporary file in the folder of `path`, then renames that file to `path`.
 pub(super) fn whole(path: &Path, text: String) -> Result<(), CampaignError> {
     let part = path.with_extension(format!("part-{}", std::process::id()));
     let cannot = || CampaignError::io("cannot write", path);

@@ -1,4 +1,8 @@
-//! Tables of a campaign: summaries over seeds with the published values, and tests of the claims.
+//! Tables of a campaign: statistics over seeds next to published values, and tests of claims.
+//!
+//! A campaign runs the commands of its stages with all combinations of seeds and levels. A level is one setting of an axis,
+//! such as one controller of the axis "controller". Each run is a cell and has a record with its measured quantities. A
+//! claim says that a quantity is smaller in the cells `less` than in the cells `than`.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,20 +18,21 @@ pub struct Summary {
     pub title: String,
     /// Unit of its quantities.
     pub unit: String,
-    /// Number of the published table for comparison; `None` without comparison.
+    /// Number of the published table that the rows are compared with; `None` without comparison.
     pub paper: Option<String>,
     /// Rows of the table.
     pub rows: Vec<SummaryRow>,
 }
 
-/// A quantity, summarised over the cells with the same levels.
+/// One quantity, summarised over the cells that have the levels of the row.
 #[derive(Clone, Debug)]
 pub struct SummaryRow {
     /// The levels of the row's axes, joined by `/`.
     pub name: String,
     /// Name of the quantity.
     pub metric: String,
-    /// Summary over the seeds and strata of the row.
+    /// Statistics of the quantity over the row's cells. Cells that differ in more than the seed belong to different strata:
+    /// the bootstrap for the intervals resamples each stratum separately.
     pub ours: Aggregate,
     /// The values of the individual cells.
     pub runs: Vec<Run>,
@@ -60,13 +65,13 @@ pub struct Finding {
 /// Result of a claim's test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// Confirmed: the 95 % interval of the difference `than − less` is above zero.
+    /// Confirmed: the 95 % interval of the difference (mean of `than` minus mean of `less`) is above zero.
     Holds,
     /// Refuted: the 95 % interval of the difference is below zero.
     Contradicted,
-    /// Undecided: the 95 % interval of the difference contains zero, or one side has fewer than three seeds.
+    /// Undecided: the 95 % interval of the difference contains zero, or the cells of one side have fewer than three seeds.
     Undecided,
-    /// Not tested: one side has no cell with the quantity.
+    /// Not tested: at least one side has no cell with the quantity.
     NoData,
 }
 
@@ -106,7 +111,7 @@ fn summary(file: &CampaignFile, table: &TableFile, records: &[Record]) -> Summar
     }
 }
 
-/// Every combination of levels that forms a row, in the order of the campaign file.
+/// The combinations of levels of the table's row axes, in the order of the campaign file. Each combination forms a row.
 fn row_levels(file: &CampaignFile, table: &TableFile) -> Vec<Vec<(String, String)>> {
     table.rows.iter().fold(vec![Vec::new()], |all, axis| {
         let levels = file.levels(axis);
@@ -143,13 +148,13 @@ fn row(
     Some(SummaryRow { name, metric: metric.into(), ours, runs, paper })
 }
 
-/// Smallest number of seeds for which an interval over seeds is used. Even many runs of one seed do not show the spread over
-/// seeds.
+/// Smallest number of seeds for which an interval over seeds is used. The runs of one or two seeds do not show the spread
+/// over seeds, however many they are.
 const FEWEST: usize = 3;
 
 impl Summary {
-    /// One sentence for each row whose 95 % interval of the mean is disjoint from the published interval. Rows with
-    /// fewer than three seeds are omitted.
+    /// One sentence for each row whose 95 % interval of the mean is disjoint from the published one. Rows with fewer than
+    /// three seeds are omitted.
     pub fn departures(&self) -> Vec<String> {
         self.rows.iter().filter_map(SummaryRow::departure).collect()
     }
@@ -186,12 +191,12 @@ pub fn said(estimate: &Estimate) -> String {
 ///
 /// # Errors
 ///
-/// If a claim names a stage or a level that does not exist.
+/// If a claim names a stage, axis or level that does not exist.
 pub fn findings(file: &CampaignFile, records: &[Record]) -> Result<Vec<Finding>, String> {
     file.claims.iter().map(|claim| finding(file, claim, records)).collect()
 }
 
-/// The levels of a cell on the axes that a claim leaves open, including the seed.
+/// The levels of a cell on the axes that a claim does not fix. They usually include the seed.
 type Levels = BTreeMap<String, String>;
 
 fn finding(file: &CampaignFile, claim: &ClaimFile, records: &[Record]) -> Result<Finding, String> {
@@ -250,8 +255,9 @@ fn left(record: &Record, fixed: &dyn Fn(&str) -> bool) -> Levels {
     open.map(|(axis, level)| (axis.clone(), level.clone())).collect()
 }
 
-/// Differences `than − less` between cells with equal open levels, by stratum. The open levels without the seed form
-/// the stratum. `None` unless every cell of both sides has exactly one partner.
+/// Differences of the quantity between paired cells, `than` minus `less`, with one vector for each stratum. Two cells form a
+/// pair if they agree in all levels that the claim does not fix. These levels without the seed name the stratum. `None`
+/// unless every cell of both sides has exactly one partner.
 fn pairs(less: &[(Levels, f64)], than: &[(Levels, f64)]) -> Option<Vec<Vec<f64>>> {
     let of: BTreeMap<&Levels, f64> = than.iter().map(|(key, value)| (key, *value)).collect();
     let own: BTreeSet<&Levels> = less.iter().map(|(key, _)| key).collect();
@@ -275,7 +281,7 @@ mod tests {
         [("prior", prior.to_owned()), (SEED, seed.to_string())].map(|(a, l)| (a.into(), l)).into()
     }
 
-    /// Three cells of two seeds are not enough, three cells of three seeds are.
+    /// Three cells of two seeds are too few for a comparison with the paper; three cells of three seeds suffice.
     #[test]
     fn many_cells_of_few_seeds_do_not_depart_from_the_paper() {
         let run = |k: u64, seed: u64| Run { cell: k.to_string(), seed: Some(seed), value: 1.0 };
@@ -290,7 +296,8 @@ mod tests {
         assert!(row([1, 2, 3]).departure().is_some());
     }
 
-    /// The values of the seeds differ by 10, those of the two sides by 1. Only the paired test can detect the latter.
+    /// The values of different seeds differ by 10, those of the two sides by 1. Only the paired test can detect the
+    /// difference between the sides.
     #[test]
     fn cells_of_one_seed_are_compared_with_each_other() {
         let side = |more: f64| -> Vec<(Levels, f64)> {

@@ -25,26 +25,29 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Check a model's aircraft in flight: trim, modes, authority of the surfaces, margins of the
-    /// LQI.
+    /// Compute trim, modes, control authority, and stability margins with the LQI (linear quadratic controller with integral
+    /// action) of a model's aircraft.
     Check(check::Arguments),
-    /// Draw aircraft from a distribution, print how they fly and whether the shipped ones lie among them, and write their files.
+    /// Draw aircraft from a distribution, print their flight characteristics and whether the shipped aircraft lie within them,
+    /// and write their files.
     Draw(draw::Arguments),
     /// Write a model as an aircraft of another program.
     Export(export::Arguments),
-    /// Fit a model of an aircraft of known mass, span and area to flights, write its page, and recommend what to fly next.
+    /// Estimate a model from mass, span and wing area, fit it to flight logs, write a page on the fitted aircraft, and
+    /// recommend what to fly next.
     #[cfg(feature = "study")]
     FromLog(from_log::Arguments),
-    /// Make airframe and model from an aircraft of another program.
+    /// Make an airframe file and a model file from an aircraft of another program.
     Import(import::Arguments),
-    /// Write airframe and model from mass, span, area and tail: textbook estimates with standard deviations.
+    /// Write an airframe file and a model file from mass, span, wing area and type of tail: textbook estimates with standard
+    /// deviations.
     New(new::Arguments),
 }
 
 /// Runs `greylag aircraft …`.
 ///
 /// # Errors
-/// If a file cannot be read or written, or the aircraft cannot be flown at all.
+/// If a file cannot be read or written, or the aircraft cannot be trimmed or stabilised.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.command {
         Command::Check(arguments) => check::run(arguments),

@@ -28,12 +28,12 @@ pub fn silence(quiet: bool) {
     SILENT.store(quiet, Ordering::Relaxed);
 }
 
-/// Whether no progress is shown (`--quiet`).
+/// Returns whether `--quiet` was given.
 pub fn is_silent() -> bool {
     SILENT.load(Ordering::Relaxed)
 }
 
-/// Progress of a task: a bar on a terminal, elsewhere one line per stage.
+/// Progress of a task on standard error: a bar if this is a terminal, otherwise one line per stage.
 pub struct Bar {
     bar: Option<ProgressBar>,
     last: Mutex<String>,
@@ -65,7 +65,7 @@ impl Bar {
         Bar { bar, last: Mutex::default() }
     }
 
-    /// Shows a stage. The result is a break if Ctrl-C was pressed.
+    /// Displays `stage`. Returns `Break` if Ctrl-C was pressed.
     pub fn update(&self, stage: Stage<'_>) -> ControlFlow<()> {
         match &self.bar {
             Some(bar) => {
@@ -85,7 +85,7 @@ impl Bar {
         not_cancelled(pressed())
     }
 
-    /// Prints a line of the result above the bar.
+    /// Prints `line` to standard output, above the bar.
     #[cfg(feature = "study")]
     pub fn print(&self, line: &str) {
         match &self.bar {
@@ -94,7 +94,7 @@ impl Bar {
         }
     }
 
-    /// Writes a stage on standard error, unless it is the same as before.
+    /// Prints the stage's name `doing` to standard error, unless it is the last one printed.
     fn line(&self, doing: &str) {
         let Ok(mut last) = self.last.lock() else { return };
         if *last != doing && !is_silent() {
@@ -104,15 +104,15 @@ impl Bar {
     }
 }
 
-/// Start and end of the work and of the report, as fractions of the progress bar. Without a report the work fills the
-/// bar.
+/// The parts of the progress bar for the work and for the writing of the report, each as [start, end] in fractions of the
+/// bar. Without a report the work has the whole bar.
 #[cfg(feature = "study")]
 pub fn shares(report: Option<&std::path::Path>) -> [[f64; 2]; 2] {
     let end = if report.is_some() { 0.9 } else { 1.0 };
     [[0.0, end], [end, 1.0]]
 }
 
-/// A break if Ctrl-C was pressed.
+/// Returns `Break` if Ctrl-C was pressed.
 fn pressed() -> ControlFlow<()> {
     match PRESSED.load(Ordering::Relaxed) {
         0 => ControlFlow::Continue(()),

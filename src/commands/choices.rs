@@ -1,16 +1,16 @@
-//! Options whose values are the names of a list. `--help` shows these names.
+//! Parsers of options whose value is one of several names. `--help` shows these names.
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::control::ControllerKind;
 
-/// Option values: the names of the controllers.
+/// Parser of an option whose value is the name of a controller.
 pub fn controller() -> impl TypedValueParser<Value = ControllerKind> {
     PossibleValuesParser::new(ControllerKind::ALL.iter().map(|kind| kind.name()))
         .try_map(|name| name.parse::<ControllerKind>())
 }
 
-/// Option values: the names of the groups of targets.
+/// Parser of an option whose value is the name of a group of target attitudes.
 #[cfg(feature = "demo")]
 pub fn group() -> impl TypedValueParser<Value = crate::sim::Group> {
     use crate::sim::Group;

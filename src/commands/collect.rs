@@ -1,4 +1,6 @@
-//! `greylag collect`: flies exploration flights in JSBSim, from which models are learned.
+//! `greylag collect`: flies exploratory episodes in JSBSim. Models are learned from these episodes.
+//!
+//! The episodes are collected in rounds. After each round a model is learned, and the next round is planned with it.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -25,18 +27,18 @@ const OPTIONS: &str = "options.txt";
 /// Options of `greylag collect`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Folder of the exploration; a round goes into a folder `round-NN` below it.
+    /// Folder of all rounds. The episodes of a round are written into its subfolder `round-NN`.
     #[arg(long)]
     out: PathBuf,
-    /// Number of the round: round 0 is random or flown by --controller, later rounds are planned by CEM-MPC with `--model`;
+    /// Number of the round. Round 0 is random or flown by --controller. Later rounds are planned by CEM-MPC with `--model`;
     /// half of the actions of round 1 are random, a quarter of those of round 2, and so on.
     #[arg(long, default_value_t = 0)]
     round: u32,
     /// Number of episodes of 1000 steps [default: 175 in round 0, else 25, as in the paper].
     #[arg(long)]
     episodes: Option<u32>,
-    /// Model to plan with, the last one trained; with --controller a model of the aircraft, from which its cruise airspeed
-    /// and rudder are taken.
+    /// Model that later rounds are planned with: the last one trained. With --controller: a model of the aircraft, from which
+    /// its cruise airspeed and rudder are taken.
     #[arg(long)]
     model: Option<PathBuf>,
     /// Controller that flies round 0 towards random attitudes, with half of the actions random: `any` or `adaptive`, which
@@ -80,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(fly(arguments, &Interruption::watch()?)?.into())
 }
 
-/// Simulates like [`run`] until `stop` is set.
+/// Simulates the episodes that have no file yet, until `stop` is set.
 pub fn fly(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let load = |path: &PathBuf| GreyBox::load(&shipped(path));
     let models: Vec<GreyBox> = arguments.model.iter().map(load).collect::<Result<_, _>>()?;
@@ -137,7 +139,7 @@ pub fn fly(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     Ok(Ended::Done)
 }
 
-/// Writes the file of an episode completely or not at all. An episode that has a file is therefore not flown again.
+/// Writes the file of an episode completely or not at all. A file therefore shows that its episode is complete.
 fn save(flight: &crate::logs::Flight, path: &Path) -> Result<()> {
     let part = path.with_extension("part");
     let _ = std::fs::remove_file(&part);
@@ -162,11 +164,11 @@ fn shared_options(arguments: &Arguments, plant: &PlantOptions) -> String {
     )
 }
 
-/// Stores `options` in `folder`.
+/// Stores `options` in `folder`. If the folder already holds episodes, compares `options` with the stored options instead.
 ///
 /// # Errors
-/// If the folder holds episodes that were flown with other options. Episodes without a file of options, as earlier
-/// versions wrote them, are accepted.
+/// If the folder holds episodes that were flown with other options. Episodes without stored options are accepted, because
+/// earlier versions stored none.
 fn keep_options(folder: &Path, options: &str) -> Result<()> {
     let path = folder.join(OPTIONS);
     let entries = std::fs::read_dir(folder)

@@ -1,4 +1,6 @@
 //! `greylag compare`: compares models with flight logs.
+//!
+//! A free run is an open-loop simulation: it starts at a measured state and uses the recorded deflections.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -46,34 +48,33 @@ pub struct Arguments {
     models: Vec<PathBuf>,
     #[command(flatten)]
     logs: LogArguments,
-    /// Horizons of the free runs, s.
+    /// Horizons of the free runs (open-loop simulations from measured states), s.
     #[arg(long = "horizon", value_delimiter = ',', default_values_t = [1.0, 2.0, 5.0, 10.0])]
     horizons: Vec<f64>,
     /// Write all results as JSON; `-` for standard output, with nothing else on it.
     #[arg(long)]
     json: Option<PathBuf>,
-    /// Write the report, one HTML page.
+    /// Write the report as one HTML page.
     #[arg(long)]
     report: Option<PathBuf>,
     /// Write every free run as CSV: model, flight, start, horizon, each state predicted and measured, and the 95 % interval
     /// of the prediction from the errors of the other runs.
     #[arg(long, value_name = "CSV")]
     predictions: Option<PathBuf>,
-    /// Use the deflections at the times that the log states for them, as `diagnose`, `amend` and the
-    /// workbench do; without this option, a delay of the log's actuator clock is corrected if it is
-    /// certain.
+    /// Use the deflections at the times that the log states for them, as `diagnose`, `amend` and the workbench do. Without this
+    /// option, a significant delay of the log's actuator clock is corrected.
     #[arg(long)]
     recorded_clock: bool,
     /// Seed of the bootstrap intervals.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Replace the JSON and the report if they exist.
+    /// Replace output files that already exist.
     #[arg(long)]
     force: bool,
 }
 
-/// Reads and reconstructs the flights and compares the models with them. Prints the results, and writes JSON and
-/// report.
+/// Reads and reconstructs the flights and compares the models with them. Prints the results, and writes the JSON, the CSV and
+/// the report.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
     for path in arguments.json.iter().chain(&arguments.report).chain(&arguments.predictions) {
@@ -113,8 +114,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// The answer for a model and its amendment. It separates the change of the error by tuning from that by the added
-/// effects. `None` unless there are two models and the second was amended from the first.
+/// The summary for a model and its refit by `greylag amend` (an amendment). It separates the change of the error by
+/// re-estimated coefficients from the change by added effects. `None` unless there are two models and the second was amended
+/// from the first.
 #[cfg(feature = "study")]
 fn traced(
     arguments: &Arguments,
@@ -140,7 +142,7 @@ fn traced(
     Ok(None)
 }
 
-/// The answer with the command to run next. For a model and its amendment it is that of `traced`.
+/// The summary with the command to run next. For a model and its amendment it is the summary of `traced`.
 fn answer(
     arguments: &Arguments,
     models: &[GreyBox],
@@ -187,7 +189,8 @@ fn print(comparison: &Comparison) {
     print_summary(&comparison.answer);
 }
 
-/// Errors of the forecasts without aerodynamics at the answer's horizon, in one line.
+/// Errors of the baseline forecasts without aerodynamics (a held state, for example) at the horizon of the summary, in one
+/// line. `None` if no forecast reaches that horizon.
 fn baselines(comparison: &Comparison) -> Option<String> {
     let horizon = comparison.answer.numbers.horizon_s;
     let error = |f: &crate::sysid::compare::forecast::ForecastResult| {
@@ -199,7 +202,7 @@ fn baselines(comparison: &Comparison) -> Option<String> {
     (!all.is_empty()).then_some(said)
 }
 
-/// Errors of free runs (open-loop simulations) in the units of each state. If a model's file has constants of the flights
+/// Errors of the free runs: NRMSE, and RMSE of each state in m/s, ° and °/s. If a model's file has constants of the flights
 /// (trims, sensor errors), the table also has the errors without these constants.
 fn free_run_table(comparison: &Comparison) -> Table {
     let header = [

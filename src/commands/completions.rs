@@ -15,9 +15,9 @@ pub struct Arguments {
     shell: Shell,
 }
 
-/// Writes the completions of `command`.
+/// Prints the script that completes the command line of `command` in the chosen shell.
 pub fn run(arguments: &Arguments, command: &mut clap::Command) -> Result<ExitCode> {
-    // not directly to standard output: the generator panics if the reader has closed it
+    // the script is not generated into standard output directly, because the generator panics if the reader has closed it
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, command, "greylag", &mut script);
     print!("{}", String::from_utf8(script)?);

@@ -10,11 +10,11 @@ use crate::control::policy::{Agent, AgentError, Origin};
 use crate::control::{Controller, ControllerKind, Needs, Source, build};
 use crate::model::GreyBox;
 
-/// Folder of the default policy, which was trained in the default model.
+/// Folder of the default policy (a trained neural network), which was trained in the default model.
 pub const POLICY: &str = "params/x8/learned/policy";
 
-/// Builds the controller `kind` for `model`, with the policy in `folder` (see [`policy`]) and `changes` of the
-/// planner's settings.
+/// Builds the controller `kind` for `model`, with the policy in `folder` (see [`policy`]). `changes` modify the settings of
+/// the planner, a controller that searches for a sequence of actions in simulations of the model.
 ///
 /// # Errors
 /// If the policy cannot be read or belongs to another airframe, or the model does not allow the controller.
@@ -28,10 +28,10 @@ pub fn controller(
     Ok(build(kind, Source { model, agent: agent.as_ref(), changes })?)
 }
 
-/// The policy in `folder` for the controller `kind` of `model`.
+/// Reads the policy in `folder` for the controller `kind` of `model`. Notes on the policy are printed on standard error.
 ///
-/// `None` if the controller uses no policy. It is also `None` if the controller can work without a policy and `folder`
-/// is the default folder, whose policy belongs to another airframe. Notes on the policy are printed on standard error.
+/// The result is `None` if the controller uses no policy. It is also `None` if three conditions hold: the controller can
+/// work without a policy, `folder` is the default folder, and its policy belongs to another airframe than the model's.
 ///
 /// # Errors
 /// If the policy cannot be read or belongs to another airframe.
@@ -61,7 +61,7 @@ pub fn policy(
     Ok(Some(agent))
 }
 
-/// A note if the policy of `origin` was trained in another model than `model`.
+/// A note for the user if the policy in `folder` was not trained in `model`. `origin` says in which model it was trained.
 fn foreign_policy_note(origin: &Origin, model: &GreyBox, folder: &Path) -> Option<String> {
     (origin.model_sha256 != model.sha256).then(|| {
         format!(

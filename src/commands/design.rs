@@ -1,4 +1,4 @@
-//! `greylag design`: finds the manoeuvre that best distinguishes two effects.
+//! `greylag design`: finds the flight-test manoeuvre whose data best distinguish two effects, one of which a model may lack.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -23,8 +23,7 @@ pub struct Arguments {
     /// The two effects: ids of the catalogue, or effect files (TOML).
     #[arg(long, value_name = "ID|FILE", num_args = 2, required = true)]
     between: Vec<String>,
-    /// Values of an effect's constants, in the effect's order, in place of typical ones (may be
-    /// repeated).
+    /// Values of an effect's constants, in the order of `greylag effects show`, instead of typical ones (may be repeated).
     #[arg(long, value_name = "ID=V,V…", allow_hyphen_values = true)]
     values: Vec<String>,
     /// Write the schedule, for `greylag fly --schedule`.
@@ -37,14 +36,16 @@ pub struct Arguments {
     json: JsonArgument,
 }
 
-/// Separation of the effects by each manoeuvre, as JSON. `separation` is null if the simulated flight leaves the roll
-/// or pitch bounds of a schedule; `needed_s` is null also if no finite time suffices.
+/// Result as JSON. `separation` measures how well the data of a manoeuvre distinguish the two effects: the squared
+/// difference between their predictions after a refit, in noise variances, summed over the flight. It is null if the
+/// simulated flight leaves the roll or pitch bounds of a schedule. `needed_s` is the flight time (s) after which the effects
+/// count as distinguished. It is null without a separation, and if no finite time suffices.
 #[derive(Serialize)]
 struct Document<'a> {
     between: [&'a str; 2],
     manoeuvres: Vec<Manoeuvre<'a>>,
     chosen: Option<&'a str>,
-    /// Flight time of the chosen manoeuvre after which the effects count as distinguished, s.
+    /// Time of flying the chosen manoeuvre after which the effects count as distinguished, s.
     chosen_s: Option<f64>,
 }
 
@@ -75,7 +76,8 @@ fn document<'a>(
     }
 }
 
-/// Simulates each manoeuvre with each of the two effects, prints the separations, and writes the best schedule.
+/// Simulates each manoeuvre with each of the two effects and prints the separations. Writes a schedule that repeats the best
+/// manoeuvre.
 ///
 /// # Errors
 /// If the model, an effect or the file cannot be used, or no manoeuvre distinguishes the two effects.

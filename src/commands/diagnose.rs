@@ -28,7 +28,7 @@ use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::per_flight::askew;
 use crate::sysid::progress::{Progress, Stage, part};
 
-/// Largest number of candidates in the table.
+/// Largest number of candidates in the table. A candidate is an effect that the model may lack.
 const ROWS: usize = 12;
 
 /// Options of `greylag diagnose`.
@@ -42,13 +42,14 @@ pub struct Arguments {
     model: PathBuf,
     #[command(flatten)]
     logs: LogArguments,
-    /// Write everything that was found as JSON; `-` for standard output, with nothing else on it.
+    /// Write the complete diagnosis as JSON; with `-` it goes to standard output, and the usual text is not printed.
     #[arg(long)]
     json: Option<PathBuf>,
-    /// Write the report, one HTML page.
+    /// Write a report as one HTML page to this file.
     #[arg(long)]
     report: Option<PathBuf>,
-    /// Bootstrap draws under the null hypothesis (no effect missing) that set the thresholds.
+    /// Number of bootstrap draws under the null hypothesis (no effect is missing); they give the thresholds above which an
+    /// effect counts as missing.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(20..))]
     nulls: u16,
     /// Seed of all random draws.
@@ -57,7 +58,7 @@ pub struct Arguments {
     /// Effect files (TOML) or folders of them, tried as candidates in addition to the catalogue.
     #[arg(long = "effect", value_name = "FILE", num_args = 1..)]
     effects: Vec<String>,
-    /// Ids of effects of the catalogue that are not tried.
+    /// Ids of effects of the catalogue that are not to be tried.
     #[arg(long, num_args = 1..)]
     without: Vec<String>,
     #[command(flatten)]
@@ -67,7 +68,7 @@ pub struct Arguments {
     force: bool,
 }
 
-/// Reads and reconstructs the flights and diagnoses the model. Prints sentences and tables, and writes JSON and report.
+/// Reads the logs, reconstructs the flights and diagnoses the model. Prints sentences and tables, and writes JSON and report.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
     for path in arguments.json.iter().chain(&arguments.report) {
@@ -135,11 +136,12 @@ struct Document<'a> {
     answer: &'a Answer,
 }
 
-/// Smallest reduction of the error by tuning for which a tuning command is recommended, %.
+/// If no effect is missing, re-estimation of the coefficients (tuning) is recommended from this reduction of the free-run
+/// (open-loop simulation) error on, %.
 const WORTH_TUNING: f64 = 1.0;
 
-/// The command to run next. `words` has the paths of effect files by the ids of their effects. `change_percent` is the change
-/// of the error by tuning and effects, %.
+/// The command to run next. `words` maps the id of an effect to the path of its effect file. `change_percent` is the change of
+/// the free-run error by tuning and by the asserted effects, % of the error of the model as given; a reduction is negative.
 fn next(
     arguments: &Arguments,
     diagnosis: &Diagnosis,
@@ -160,7 +162,7 @@ fn next(
         (Verdict::Adequate, _) => {
             format!("greylag amend --model {model}{logs} --tune-only --out {out}")
         }
-        // a formula is tested on a flight that its search has not seen
+        // `propose` needs two flights: it searches a formula on one and tests it on the other
         (Verdict::Unexplained, _) if arguments.logs.paths.len() < 2 => String::new(),
         (Verdict::Unexplained, _) => format!("greylag propose --model {model}{logs}"),
         // the flights themselves are in doubt, so the logs are inspected first
@@ -178,12 +180,14 @@ fn design(model: &str, pair: &[String; 2], words: &BTreeMap<String, String>) -> 
     format!("greylag design --model {model} --between {a} {b}")
 }
 
-/// The command that fits misaligned axes in place of an effect that cannot be distinguished from them.
+/// The command that estimates a misalignment of the sensor axes for each flight. It is recommended if these flights cannot
+/// distinguish the misalignment from the asserted effects.
 fn turned(model: &str, logs: &str, out: &str) -> String {
     format!("greylag amend --model {model}{logs} --tune-only --axes-askew 3 --out {out}")
 }
 
-/// Whether the flights do not distinguish an asserted effect from another explanation.
+/// Whether an asserted effect cannot be distinguished from another explanation with these flights. An effect is asserted if
+/// the diagnosis states that the model lacks it.
 fn in_doubt(diagnosis: &Diagnosis) -> bool {
     alike(diagnosis).next().is_some()
 }
@@ -193,13 +197,13 @@ fn alike(diagnosis: &Diagnosis) -> impl Iterator<Item = &String> {
     diagnosis.effects.iter().filter(|c| c.asserted).flat_map(|c| &c.indistinguishable_from)
 }
 
-/// Whether `alike` names misaligned axes and nothing else.
+/// Whether `alike` names the misalignment of the sensor axes and nothing else.
 fn only_axes<'a>(alike: impl Iterator<Item = &'a String>) -> bool {
     let mut alike = alike.peekable();
     alike.peek().is_some() && alike.all(|id| id == askew::ID)
 }
 
-/// The report as HTML, with the errors of the models by channel and regime.
+/// The report as HTML, with the errors of the models by channel and flight condition.
 fn page(
     arguments: &Arguments,
     (diagnosis, answer): (&Diagnosis, &Answer),
@@ -299,7 +303,7 @@ fn share(x: f64) -> String {
     if x.is_finite() { format!("{:.3} %", 100.0 * x) } else { "–".into() }
 }
 
-/// Table of the constants estimated for each flight; `None` if none were requested.
+/// Table of the constants that were estimated for each flight separately; `None` if there are none. Angles are in degrees.
 fn own(diagnosis: &Diagnosis) -> Option<Table> {
     let angles = diagnosis.measurement.iter().filter(|m| m.id == askew::ID).map(|m| {
         let [value, sd] = [m.value, m.sd].map(f64::to_degrees);

@@ -1,4 +1,5 @@
-//! Checks that no flight is given twice. A fit would otherwise count it twice, or be validated on its own data.
+//! Checks that the user names no flight twice. Otherwise the flight would count twice in a fit, or the fit would be
+//! validated on its own data.
 
 use std::path::{Path, PathBuf};
 
@@ -6,8 +7,8 @@ use anyhow::{Result, bail};
 
 use crate::model::residual::hash;
 
-/// Checks that no flight occurs twice in `fitted`, twice in `held`, or in both. Files are compared by content, because one
-/// file can have several paths and copies.
+/// Checks that no flight occurs twice among the flights to fit (`fitted`), twice among the flights for validation (`held`),
+/// or in both. Files are compared by content, because a file can have several paths and copies.
 ///
 /// # Errors
 /// If two files have the same content. The error names both. A file that cannot be read is skipped, because the command
@@ -36,8 +37,8 @@ pub fn distinct(fitted: &[PathBuf], held: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-/// Checks that no two of `logs` have the same file name. This is required if each flight has constants of its own, because
-/// the model file stores them under the file name of the log.
+/// Checks that no two of `logs` have the same file name. This is required if trims or axis angles are estimated for each
+/// flight, because the model file stores them under the file name of the log.
 ///
 /// # Errors
 /// If two logs have the same file name. The error names both.

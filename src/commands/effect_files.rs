@@ -1,4 +1,7 @@
-//! Effects that a user names by id, by effect file or by a folder of effect files.
+//! Resolves the effects that a user names by id, by effect file or by a folder of effect files.
+//!
+//! An effect is one term of the forces, moments or control inputs in an aircraft model, such as the stall. An effect file defines
+//! an effect by a formula.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,10 +13,11 @@ use crate::logs::quoted;
 use crate::physics::effects::Kind;
 use crate::physics::formula::register;
 
-/// The ids of `effects`. Each entry is an id, an effect file or a folder of effect files. The files are read.
+/// The ids of `effects`. Each entry is an id, an effect file or a folder of effect files. The effects of the files are
+/// registered, so that the program finds them by id.
 ///
 /// # Errors
-/// If a file cannot be read or is no effect file.
+/// If a file cannot be read or is no effect file, or a folder contains no effect file.
 pub fn named_effects(effects: &[String]) -> Result<Vec<String>> {
     let mut ids: Vec<String> = Vec::new();
     for named in effects {
@@ -31,7 +35,8 @@ pub fn named_effects(effects: &[String]) -> Result<Vec<String>> {
     Ok(ids)
 }
 
-/// For each effect of an effect file among `effects`: its id, and the quoted path of its file for a command line.
+/// Maps ids to files: for each effect that `effects` names by file or folder, the path of its file. The path is quoted for a
+/// command line.
 ///
 /// # Errors
 /// If a file cannot be read or is no effect file.
@@ -52,7 +57,7 @@ pub fn file_words(effects: &[String]) -> Result<BTreeMap<String, String>> {
     Ok(words)
 }
 
-/// Paths of the effect files in `folder`. They begin with `named`, the path of the folder as the user wrote it.
+/// Paths of the `.toml` files in `folder`. They begin with `named`, the path of the folder as the user wrote it.
 fn folder_files(named: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder)? {
@@ -65,12 +70,12 @@ fn folder_files(named: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Whether `named` is the name of a file. An id has neither a dot nor a slash.
+/// Whether `named` is a path and not an id. Only a path contains a dot or a slash.
 pub fn is_file(named: &str) -> bool {
     named.contains(['.', '/', '\\'])
 }
 
-/// The `ids` whose effects come from effect files.
+/// Those of `ids` whose effects are defined by effect files.
 pub fn own_effects(ids: &[String]) -> Vec<String> {
     let own = |id: &&String| Kind::from_id(id).is_some_and(|kind| kind.written().is_some());
     ids.iter().filter(own).cloned().collect()

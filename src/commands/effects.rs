@@ -1,4 +1,4 @@
-//! `greylag effects`: shows the catalogue of physical effects.
+//! `greylag effects`: shows the catalogue of physical effects, such as stall or a servo delay, that a model can include.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -31,7 +31,8 @@ pub struct Arguments {
 enum What {
     /// List all effects, one per line.
     List(JsonArgument),
-    /// Describe one effect of the catalogue or of a file in full; with --report, draw its signature.
+    /// Describe one effect of the catalogue or of a file in full. With --report, draw its signature: how it changes forces,
+    /// moments and the response to a manoeuvre.
     Show(Show),
     /// List the variables and functions of formulas in effect files.
     Variables,
@@ -42,7 +43,7 @@ struct Show {
     /// The effect's id, as `greylag effects list` names it, or an effect file.
     #[arg(value_name = "ID|FILE")]
     id: String,
-    /// Write the effect's page, one HTML file with its signature.
+    /// Write an HTML page with the description and the signature of the effect.
     #[arg(long)]
     report: Option<PathBuf>,
     /// Model for which the signature is computed.
@@ -175,7 +176,7 @@ fn list() -> String {
     )
 }
 
-/// The letters of an effect's channels.
+/// The channels of an effect as text: for most effects the letters of its forces and moments, such as `D L m`.
 fn channels(place: Place, about: &Description) -> String {
     let letter = |channel: &Channel| match channel {
         Channel::Drag => "D",
@@ -207,7 +208,7 @@ fn variables() -> String {
     text + "  clamp        clamp(x, low, high)\n  table        table(x; x1:y1, x2:y2, …): linear between, constant beyond\n"
 }
 
-/// The effect with the id `name`, or of the effect file `name`.
+/// The effect with the id `name`, or the effect in the file `name`.
 fn named(name: &str) -> Result<(Place, Description)> {
     if is_file(name) {
         let read = register::load(&shipped(Path::new(name)))?;
@@ -246,7 +247,8 @@ fn written(effect: &Written) {
 fn show(show: &Show) -> Result<()> {
     let (place, about) = named(&show.id)?;
     let overwrite = show.force.into();
-    // both files are checked first: if only one were written, the corrected command would be refused because of it
+    // Both outputs are checked before either is written. Otherwise the JSON file could be written and the page refused, and a
+    // second attempt would be refused because the JSON file exists.
     show.json.writable(overwrite)?;
     if let Some(path) = &show.report {
         files::writable(path, overwrite)?;
@@ -298,7 +300,8 @@ fn print(place: Place, about: &Description, channels: &str) {
     }
 }
 
-/// Coefficients for the signature: the example of the catalogue, or the values of the model for an effect of a prior.
+/// Coefficients for the signature: the example values of the catalogue. An effect without example values, such as linear
+/// lift, takes its coefficients from `model`.
 fn example(model: &GreyBox, about: &Description) -> Vec<f64> {
     match about.entry {
         Some(entry) => entry.example.into(),

@@ -1,4 +1,4 @@
-//! `greylag evaluate`: flies controllers to targets and scores them.
+//! `greylag evaluate`: flies controllers to targets (commanded attitude and airspeed) and scores them.
 
 mod any;
 mod derivatives;
@@ -33,7 +33,7 @@ use crate::sim::tracking::{Tracking, track};
 use crate::sim::{Group, Simulator};
 use draws::over_draws;
 
-/// Options that do not apply to flights in drawn models.
+/// Options that apply to flights in JSBSim only. They conflict with `--draws` and `--any`, which draw the aircraft at random.
 const IN_JSBSIM: [&str; 11] = [
     "report",
     "aircraft",
@@ -48,8 +48,8 @@ const IN_JSBSIM: [&str; 11] = [
     "start_altitude_m",
 ];
 
-/// Options that do not apply to drawn aircraft. Drawn aircraft fly random attitudes, with controllers that are designed for
-/// each aircraft and have no envelope limiter.
+/// Options that conflict with `--any`. Its aircraft fly random attitudes in place of targets. Its controllers are designed
+/// for each aircraft and have no envelope limiter.
 const UNUSED_BY_ANY: [&str; 11] = [
     "draws",
     "steps",
@@ -140,7 +140,7 @@ enum EnvelopeName {
     Free,
 }
 
-/// Content of the JSON document.
+/// Contents of the JSON file.
 #[derive(Serialize)]
 struct Document<'a> {
     schema: &'static str,
@@ -205,10 +205,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Roll and pitch, degrees, of the paper's Figures 7 to 9.
+/// Commanded roll and pitch, degrees, in Figures 7 to 9 of the paper \[GSFM26\] (see `src/lib.rs`).
 const SHOWN: [[f64; 2]; 3] = [[-58.0, -21.0], [55.0, 28.0], [20.0, 10.0]];
 
-/// Flies every controller to the targets `SHOWN`.
+/// Flies every controller to each of the attitudes [`SHOWN`]. Returns each target with the flight of each controller.
 fn flights(entrants: &[Entrant], plant: &PlantOptions) -> Result<Vec<(Target, Vec<Tracking>)>> {
     let mut simulator = Simulator::new(plant)?;
     let mut all = Vec::new();
@@ -246,9 +246,9 @@ fn page(
     report.page().render()
 }
 
-/// The command that flies the best controller in the demonstration. It is empty if several models or policies flew,
-/// because a controller's name does not identify their files. It is also empty for a user's own aircraft, because the
-/// command would have to repeat its options.
+/// The `greylag demo` command for the best controller. It is empty if several models or policies were given, because the
+/// controller's name does not say which of them it used. It is also empty for a user's own aircraft, because the command
+/// would have to repeat the options of the aircraft.
 fn next(arguments: &Arguments, evaluations: &[Evaluation], plant: &PlantOptions) -> String {
     match (evaluation_best(evaluations), &arguments.models[..], &arguments.policies[..]) {
         (Some(best), [model], [policy]) if plant.aircraft_dir.is_none() => format!(
@@ -288,8 +288,8 @@ struct Entrant {
     controller: Box<dyn Controller>,
 }
 
-/// Every controller with every model or policy from which it can be built. A controller that needs neither is built
-/// once.
+/// Builds each controller once for every model, every policy, or every pair of both, as its kind needs. A controller that
+/// needs neither is built once.
 fn entrants(arguments: &Arguments, models: &[GreyBox]) -> Result<Vec<Entrant>> {
     let (models, none) = (models.iter(), PathBuf::new());
     let policies = || arguments.policies.iter();

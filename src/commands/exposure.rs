@@ -1,5 +1,5 @@
-//! Access control of the clients' links. A link must stay on this machine, be signed, or be allowed explicitly by the user.
-//! The vehicle's link may be open, with a warning.
+//! Access control of the links. A client's link must be reachable from this machine only, or be signed, unless the user
+//! allows unsigned links explicitly. The vehicle's link may be unsigned and reachable, with a warning.
 
 use anyhow::{Result, bail};
 
@@ -37,12 +37,12 @@ pub fn vehicle(address: &Address, link: VehicleLink) -> Option<String> {
     })
 }
 
-/// Exposure that the user allows.
+/// Links to clients that the user allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Asked {
-    /// Only signed links, and links of this machine.
+    /// Only signed links, and links that only this machine can reach.
     Nothing,
-    /// Unsigned links that other machines can reach.
+    /// Also unsigned links that other machines can reach.
     Insecure,
 }
 

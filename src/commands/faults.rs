@@ -1,4 +1,5 @@
-//! `greylag faults`: flies a campaign of seeded flights under faults and checks them automatically.
+//! `greylag faults`: simulates flights of the companion (Greylag's autopilot) with faults, which the seed of a flight determines.
+//! A finding is a violation of a flight rule. The counterpart is the flight controller or simulator on the companion's link.
 
 mod ledger;
 mod monitor;
@@ -85,13 +86,13 @@ pub struct Arguments {
     json: JsonArgument,
 }
 
-/// The flights as JSON.
+/// Contents of the JSON file: the flights with their findings.
 #[derive(Serialize)]
 struct Document<'a> {
     flights: &'a [Entry],
 }
 
-/// Option values: the names of the counterparts.
+/// Parser of the name of a counterpart.
 fn counterparts() -> impl TypedValueParser<Value = Counterpart> {
     let names = Counterpart::ALL.map(|counterpart| {
         PossibleValue::new(counterpart.name()).help(match counterpart {
@@ -110,8 +111,7 @@ fn counterparts() -> impl TypedValueParser<Value = Counterpart> {
     })
 }
 
-/// Flies the campaign. The exit status is 0 if the companion itself never failed and every other finding has a fault as
-/// its cause.
+/// Flies the campaign. The exit status is 0 if the companion itself never failed and a fault caused every other finding.
 ///
 /// # Errors
 /// If an aircraft or a controller cannot be built, or the file of `--resume` cannot be used.
@@ -185,7 +185,7 @@ fn seeds(first: u64, flights: u64) -> Result<std::ops::Range<u64>> {
     Ok(first..end)
 }
 
-/// Factory of the default companions of scenarios: the controller `kind` of the default model, with the X8.
+/// Factory of the default companions: the controller `kind`, built from the default model, flies the X8.
 ///
 /// # Errors
 /// If the shipped model or policy cannot be read.
@@ -214,8 +214,8 @@ fn factory(
     Ok(CompanionFactory::new(companion, model)?.with_aircraft(plant.clone()))
 }
 
-/// Prints a table of faults by counterparts: the number of flights with the fault, and the number of these flights with
-/// a finding.
+/// Prints a table with one row for each kind of fault and one column for each counterpart. Each entry states the number of
+/// flights with the fault, and how many of these have a finding.
 fn print_faults(controller: ControllerKind, counterparts: &[Counterpart], entries: &[Entry]) {
     println!("\n{}: findings of flights of 60 s with each fault", controller.name());
     let mut table = Table::new();
@@ -236,7 +236,8 @@ fn print_faults(controller: ControllerKind, counterparts: &[Counterpart], entrie
     println!("{table}");
 }
 
-/// Prints the counts of findings, then each flight with a finding that fails the campaign.
+/// Prints the counts of findings. For each flight with a finding that fails the campaign, prints the command that repeats
+/// the flight.
 fn print_findings(entries: &[Entry]) {
     println!("\n{} flights in all", entries.len());
     let mut counts: BTreeMap<(&str, &str), u64> = BTreeMap::new();
@@ -255,7 +256,7 @@ fn print_findings(entries: &[Entry]) {
     }
 }
 
-/// Prints the findings, faults and messages of a flight.
+/// Prints the findings, the faults and the companion's messages of a flight.
 fn show(report: &Report) {
     let mut lines = vec![format!("greylag faults {}", Entry::from(report).options())];
     for f in &report.findings {
@@ -279,8 +280,8 @@ mod tests {
     use crate::physics::Command;
     use crate::sim::faults::Finding;
 
-    /// Runs a test on all cores with a stack that is large enough for the LQI's design: its dual numbers are large in
-    /// a build without optimisation.
+    /// Runs a test on all cores with a large stack. The design of the LQI needs it in a build without optimisation, because
+    /// its dual numbers are large.
     fn roomy(test: fn()) {
         let pool = rayon::ThreadPoolBuilder::new().stack_size(16 << 20).build().unwrap();
         pool.install(test);
@@ -299,7 +300,7 @@ mod tests {
     fn a_few_flights_with_every_fault_leave_the_companion_sound() {
         roomy(|| {
             let factory = factory();
-            // Over this many seeds each kind of fault is the first fault once. The seeds are distributed over the
+            // Over these seeds each kind of fault is the first fault of exactly one flight. The seeds are distributed over the
             // counterparts.
             for seed in 0..FaultKind::DRAWN.len() as u64 {
                 let counterpart = Counterpart::ALL[seed as usize % Counterpart::ALL.len()];

@@ -1,4 +1,4 @@
-//! Files that a user names on the command line.
+//! Checks and writes the output files that a user names on the command line.
 
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
@@ -51,7 +51,7 @@ struct Document<'a, T> {
 }
 
 impl JsonArgument {
-    /// Fails at once if the JSON file could not be written later.
+    /// Fails if the JSON file cannot be written, see `writable`.
     pub fn writable(&self, overwrite: Overwrite) -> Result<()> {
         self.json.as_ref().map_or(Ok(()), |path| writable(path, overwrite))
     }
@@ -75,7 +75,7 @@ impl JsonArgument {
     }
 }
 
-/// Fails at once if `path` could not be written later. Otherwise a long task would be lost.
+/// Fails if `path` cannot be written. A command calls this before a long computation, whose result would otherwise be lost.
 pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
     if is_stdout(Some(path)) {
         return Ok(());
@@ -95,7 +95,8 @@ pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
     Ok(())
 }
 
-/// Writes a file through a temporary file. The file is either complete or absent. The path `-` is standard output.
+/// Writes `content` to a temporary file that then becomes `path`, so that no incomplete file remains. The path `-` is
+/// standard output.
 pub fn write(path: &Path, content: &str, overwrite: Overwrite) -> Result<()> {
     writable(path, overwrite)?;
     if is_stdout(Some(path)) {
@@ -117,8 +118,7 @@ pub fn command_line() -> String {
     line_of(std::env::args_os().skip(1))
 }
 
-/// The command line with these arguments, quoted for a shell. If an argument is not valid Unicode, such as the path of
-/// an old log, its invalid bytes are replaced.
+/// The command line with these arguments, quoted for a shell. Bytes that are not valid Unicode are replaced.
 fn line_of(arguments: impl Iterator<Item = OsString>) -> String {
     arguments.fold("greylag".into(), |line, word| line + " " + &quoted(Path::new(&word)))
 }

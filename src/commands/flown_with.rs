@@ -1,5 +1,5 @@
-//! Model and controller of a recorded flight. They are stored in the recording's folder, so that `replay` and `report`
-//! need no options for them.
+//! A file in a recording's folder that states the model and the controller of the flight. With it, `greylag replay` and
+//! `greylag report` need no options for them.
 
 use std::path::{Path, PathBuf};
 
@@ -12,9 +12,9 @@ use crate::control::ControllerKind;
 use crate::control::cem::Change;
 use crate::model::GreyBox;
 
-/// File name in a recording.
+/// Name of the file in a recording's folder.
 pub const FILE: &str = "flown-with.toml";
-/// Schema of the file.
+/// Version of the file's format.
 const SCHEMA: u32 = 1;
 
 /// Controller, model and link of a flight.
@@ -22,7 +22,7 @@ const SCHEMA: u32 = 1;
 #[serde(deny_unknown_fields)]
 pub struct FlownWith {
     schema: u32,
-    /// The program with its version.
+    /// Name and version of the program.
     program: String,
     /// Command line of the flight.
     command: String,
@@ -32,51 +32,52 @@ pub struct FlownWith {
     pub model: PathBuf,
     /// SHA-256 of the model's files.
     model_sha256: String,
-    /// The folder of the policy.
+    /// Folder of the trained policy, a neural network. It is recorded even if the controller uses none.
     pub policy: PathBuf,
-    /// Settings of the planner, as KEY=VALUE.
+    /// Settings, as KEY=VALUE, that the user changed in the planner: a controller that searches for commands with the model.
     #[serde(default)]
     planner: Vec<String>,
-    /// Airframe file in place of the model's.
+    /// Airframe file that replaced the one named by the model file; `None` if none did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub airframe: Option<PathBuf>,
     /// Path of the flight-test schedule.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub schedule: Option<PathBuf>,
-    /// Profile of the vehicle's link.
+    /// Kind of autopilot at the other end of the link: the simulator's, PX4 or ArduPilot.
     pub profile: ProfileName,
-    /// Quantity that was commanded to the flight controller.
+    /// Quantity that was commanded to a real flight controller: surfaces or attitude.
     pub commanded: CommandName,
 }
 
 /// Options of `fly` or `demo` that are stored with the recording.
 #[derive(Clone, Copy, Debug)]
 pub struct Chosen<'a> {
-    /// Controller that flies.
+    /// Kind of controller that flies.
     pub controller: ControllerKind,
     /// Path of the model file.
     pub model: &'a Path,
-    /// The folder of the policy.
+    /// Folder of the trained policy.
     pub policy: &'a Path,
-    /// Settings of the planner.
+    /// Settings that the user changed in the planner.
     pub changes: &'a [Change],
-    /// Airframe file in place of the model's.
+    /// Airframe file that replaces the one named by the model file; `None` if none does.
     pub airframe: Option<&'a Path>,
     /// Path of the flight-test schedule.
     pub schedule: Option<&'a Path>,
-    /// The other end of the vehicle's link.
+    /// Kind of autopilot at the other end of the link.
     pub profile: ProfileName,
-    /// Quantity that is commanded to the flight controller.
+    /// Quantity that is commanded to a real flight controller.
     pub commanded: CommandName,
 }
 
-/// A path that is valid in any working directory. A path of a shipped file stays as it is.
+/// The absolute form of `path`, which is valid in any working directory. A path that does not exist stays as it is, such as the
+/// path of a file that only the program's own copy of `params/` contains.
 fn lasting(path: &Path) -> PathBuf {
     std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
 }
 
 impl FlownWith {
-    /// Writes controller, model and link of the flight into the recording `folder`.
+    /// Writes the file into the recording's folder `folder`. `model` is the model in the file `chosen.model`.
     pub fn write(folder: &Path, chosen: &Chosen<'_>, model: &GreyBox) -> Result<()> {
         let said = FlownWith {
             schema: SCHEMA,
@@ -98,8 +99,8 @@ impl FlownWith {
         files::write(&folder.join(FILE), &text, Overwrite::New)
     }
 
-    /// Reads the file from a recording; `None` if the recording has no such file. Recordings from before November 2026
-    /// have none.
+    /// Reads the file from the recording's folder `folder`. Returns `None` if there is no such file, as in recordings from
+    /// before November 2026.
     ///
     /// # Errors
     /// If the file cannot be read, is invalid or has another schema.
@@ -118,7 +119,7 @@ impl FlownWith {
         Ok(Some(said))
     }
 
-    /// The settings of the planner.
+    /// The settings that the user changed in the planner.
     ///
     /// # Errors
     /// If a setting cannot be parsed.
@@ -126,7 +127,7 @@ impl FlownWith {
         Ok(self.planner.iter().map(|text| text.parse()).collect::<Result<_, _>>()?)
     }
 
-    /// The controller.
+    /// The controller that flew.
     ///
     /// # Errors
     /// If this program has no controller of that name.
@@ -134,7 +135,7 @@ impl FlownWith {
         Ok(self.controller.parse()?)
     }
 
-    /// Note if the model's files have changed since the flight.
+    /// A note for the user if `model` has other files than the model that flew; `None` if the files are the same.
     pub fn changed_model(&self, model: &GreyBox) -> Option<String> {
         (model.sha256 != self.model_sha256).then(|| {
             format!(

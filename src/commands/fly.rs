@@ -1,4 +1,4 @@
-//! `greylag fly`: runs the companion on a real or simulated vehicle.
+//! `greylag fly`: runs the companion autopilot, which steers a real or simulated vehicle over MAVLink.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -39,9 +39,9 @@ use crate::model::GreyBox;
 use crate::physics::Airframe;
 use crate::physics::airframe::ActuatorFigures;
 
-/// The default model: learned from flights, starting from an imperfect prior.
+/// The default model of the aircraft. It was learned from simulated flights, starting from a model with wrong coefficients.
 pub const MODEL: &str = "params/x8/learned/model.toml";
-/// The default controller.
+/// Name of the default controller.
 pub const CONTROLLER: &str = "hybrid-ilqr";
 
 /// The arguments of `greylag fly`.
@@ -53,25 +53,26 @@ pub struct Arguments {
     /// Flight controller or simulator at the other end of the vehicle's link.
     #[arg(long, value_name = "NAME", default_value = "sitl", value_enum)]
     profile: ProfileName,
-    /// Quantity commanded to a real flight controller: surfaces (MANUAL), or attitude (OFFBOARD,
-    /// GUIDED).
+    /// Quantity commanded to a real flight controller: surfaces (in its mode MANUAL), or attitude (in
+    /// OFFBOARD or GUIDED).
     #[arg(long, value_name = "WHAT", default_value = "surfaces", value_enum)]
     command: CommandName,
-    /// Link to clients; may be given several times. A link that other machines can reach needs --sign, or --insecure.
+    /// Link to clients, such as ground stations; may be given several times. A link that other machines can reach needs --sign,
+    /// or --insecure.
     #[arg(long = "client", value_name = "ADDRESS", default_values = ["udpin:127.0.0.1:14550", "udpout:127.0.0.1:14540"])]
     clients: Vec<Address>,
     /// Sign messages to clients and refuse unsigned ones, with the key in this file: 64 hexadecimal
     /// digits, readable by its owner only.
     #[arg(long, value_name = "FILE")]
     sign: Option<PathBuf>,
-    /// Sign the vehicle's link as well.
+    /// Sign messages to the vehicle as well, and refuse unsigned ones from it.
     #[arg(long, requires = "sign")]
     sign_vehicle: bool,
-    /// A further link to clients, declared local: messages on it are not signed; may be given
-    /// several times.
+    /// A further link to clients, on which messages are neither signed nor checked because the user
+    /// declares it local; may be given several times.
     #[arg(long, value_name = "ADDRESS", requires = "sign")]
     local: Vec<Address>,
-    /// Let anybody who reaches an unsigned link steer the aircraft, from other machines too.
+    /// Allow unsigned links that other machines can reach: anybody who reaches one can steer the aircraft.
     #[arg(long)]
     insecure: bool,
     /// Controller that flies the aircraft.
@@ -86,10 +87,10 @@ pub struct Arguments {
     /// Settings of the planner that differ from the defaults, as KEY=VALUE.
     #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
     changes: Vec<Change>,
-    /// Airframe file in place of the one that the model names.
+    /// Airframe file that replaces the one named in the model file.
     #[arg(long, value_name = "FILE")]
     airframe: Option<PathBuf>,
-    /// Fly this flight-test schedule whenever a client is in offboard mode.
+    /// Fly this flight-test schedule instead of the client's setpoints in offboard mode.
     #[arg(long, value_name = "FILE")]
     schedule: Option<PathBuf>,
     /// New folder for the recording [default: the next number under flights/].
@@ -98,10 +99,10 @@ pub struct Arguments {
     /// Do not record the flight.
     #[arg(long)]
     no_record: bool,
-    /// Wait for every plan, for a simulator that waits for every answer.
+    /// Lockstep, for a simulator that waits for each command: wait for every plan, also for a late one.
     #[arg(long)]
     lockstep: bool,
-    /// Time after a state frame at which a plan is late, in milliseconds.
+    /// A plan counts as late if it arrives more than this time after the vehicle's state, in milliseconds.
     #[arg(long, value_name = "MS", default_value_t = FlightOptions::PLAN_DEADLINE.as_millis() as u64, value_parser = clap::value_parser!(u64).range(1..=1000))]
     plan_deadline_ms: u64,
     /// Run with real-time priority (SCHED_FIFO), where the system permits it.
@@ -116,9 +117,9 @@ pub struct Arguments {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ProfileName {
-    /// The simulator's own profile.
+    /// The simulator `greylag-sitl` with its own interface.
     Sitl,
-    /// A flight controller with PX4, fixed wing.
+    /// A flight controller with PX4 for fixed wings.
     Px4,
     /// A flight controller with ArduPilot Plane.
     Ardupilot,
@@ -135,7 +136,7 @@ pub enum CommandName {
 }
 
 impl ProfileName {
-    /// The stack of a real flight controller; `None` for the simulator.
+    /// The flight stack (autopilot software) of a real flight controller; `None` for the simulator.
     pub fn stack(self) -> Option<Stack> {
         match self {
             ProfileName::Sitl => None,
@@ -146,7 +147,7 @@ impl ProfileName {
 }
 
 impl CommandName {
-    /// Authority of the companion over a real flight controller.
+    /// The same choice as a value of [`Authority`], the type of the vehicle's link.
     pub fn authority(self) -> Authority {
         match self {
             CommandName::Surfaces => Authority::Surfaces,
@@ -191,7 +192,7 @@ impl Arguments {
     }
 
     fn controller_profile(&self, model: &GreyBox) -> Option<Profile> {
-        // no message of a real controller's link commands a rudder
+        // no message of the companion to a real flight controller commands a rudder
         let actuators = ActuatorFigures { rudder: None, ..model.airframe.actuators };
         let authority = self.command.authority();
         self.profile.stack().map(|stack| Profile { stack, authority, actuators })
@@ -208,8 +209,8 @@ fn seconds(text: &str) -> Result<Duration, String> {
 /// Flies until Ctrl-C or the end of the duration.
 ///
 /// # Errors
-/// If a file cannot be read or is invalid, a link cannot be opened or a recording cannot be created. In these cases no
-/// flight has been started.
+/// If a file cannot be read or is invalid, an unsigned link is exposed without `--insecure`, a link cannot be opened or a
+/// recording cannot be created. No flight starts in these cases. An error is also returned if the control thread panics.
 pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let asked = if arguments.insecure { Asked::Insecure } else { Asked::Nothing };
     let exposed = exposure::check(arguments.unsigned(), asked)?;
@@ -241,7 +242,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         punctual::print_timing(class);
     }
     if let Some(folder) = &flight.recording {
-        // the flight continues, because the recording is complete without this file
+        // The flight continues without this file, because `replay` takes the same information as options.
         if let Err(why) = FlownWith::write(folder, &arguments.chosen(), &model) {
             complain(format_args!("`replay` will need this flight's options: {why:#}"));
         }
@@ -280,7 +281,7 @@ fn options(arguments: &Arguments, model: &GreyBox) -> FlightOptions {
     }
 }
 
-/// Loads a model file, with another airframe if one is given. [`shipped`] resolves paths below `params/`.
+/// Loads a model file and, if `airframe` is given, replaces its airframe. [`shipped`] resolves paths below `params/`.
 ///
 /// # Errors
 /// If the model file or the airframe file cannot be read or is invalid.
@@ -292,13 +293,14 @@ pub fn model(path: &Path, airframe: Option<&Path>) -> anyhow::Result<GreyBox> {
     Ok(model)
 }
 
-/// A pilot with its controllers, behind the envelope limiter of `model`. The controller `kind` flies, with the policy
-/// in `folder`, see [`controllers::policy`](crate::commands::controllers::policy). The fallback is an LQI of the same
-/// model. If no LQI can be designed, the fallback is `pid-retuned`, with a line on standard error.
+/// The companion of `greylag fly`: the controller `kind`, and a pilot that checks and limits the commands in each cycle. The
+/// pilot has the envelope limiter of `model` and a fallback controller. `folder` holds the policy, see
+/// [`controllers::policy`](crate::commands::controllers::policy). The fallback is an LQI of the same model. If no LQI can
+/// be designed, the fallback is `pid-retuned`, and a line on standard error says so.
 ///
 /// # Errors
-/// If the policy cannot be read or belongs to another airframe, if the model does not allow `kind`, or if the model can
-/// be trimmed at its cruise airspeed neither in level flight nor in a glide. An LQI that cannot be designed as the
+/// If the policy cannot be read or belongs to another airframe, if `kind` cannot be built from the model, or if the model
+/// can be trimmed at its cruise airspeed neither in level flight nor in a glide. An LQI that cannot be designed as the
 /// fallback is no error.
 pub fn companion_with(
     kind: ControllerKind,
@@ -308,10 +310,10 @@ pub fn companion_with(
     companion_with_planner(kind, model, folder, &[])
 }
 
-/// The same as [`companion_with`], with `changes` of the planner's settings.
+/// The same as [`companion_with`]. `changes` replace default settings of the planner.
 ///
 /// # Errors
-/// The same as [`companion_with`], or if there are changes and no planner.
+/// The same as [`companion_with`], or if there are changes and `kind` has no planner.
 pub fn companion_with_planner(
     kind: ControllerKind,
     model: &GreyBox,
@@ -334,8 +336,8 @@ pub fn companion_with_planner(
     Ok(Companion { pilot, controller, placement })
 }
 
-/// The fallback controller of `model`: an LQI. If no LQI can be designed, it is `pid-retuned`, with a line on standard
-/// error.
+/// The fallback controller of `model`: an LQI. If no LQI can be designed, it is `pid-retuned`, and a line on standard error
+/// says so.
 ///
 /// # Errors
 /// If `pid-retuned` cannot be built either.

@@ -10,7 +10,7 @@ use super::files::shipped;
 use crate::logs::Format;
 use crate::model::GreyBox;
 
-/// Number of bytes at the start of a file that identify it.
+/// Number of bytes that are read from the start of a file to identify its format.
 const HEAD: u64 = 4096;
 
 /// Loads the model at `path`, which may be a path below the shipped `params/`.
@@ -28,7 +28,7 @@ pub fn model(path: &Path) -> Result<GreyBox> {
     Ok(GreyBox::load(&found)?)
 }
 
-/// Refuses a model that is given as a log.
+/// Refuses a `.toml` file that is given in place of a log.
 ///
 /// # Errors
 /// If `path` is a `.toml` file.
@@ -43,14 +43,14 @@ pub fn log(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Whether a file has the content of a log, and no `.toml` name.
+/// Whether the content of a file is that of a log, and its name does not end in `.toml`.
 fn is_log(path: &Path) -> bool {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         return false;
     }
     let mut head = Vec::new();
     let read = File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
-    // a text that starts as a comment or as JSON is no log, although it may contain commas
+    // a text that starts like a comment or like JSON is no log, although its commas make it look like CSV
     let other = matches!(head.first(), Some(b'#' | b'{' | b'['));
     read.is_ok() && !other && Format::of(&head).is_some()
 }

@@ -1,4 +1,7 @@
 //! Options that name flight logs, and the reconstruction of the flights in these logs.
+//!
+//! A reconstruction estimates states, sensor errors and wind from kinematics alone. A finding is a suspected error of a log,
+//! for instance a wrong unit.
 
 use std::path::{Path, PathBuf};
 
@@ -30,7 +33,7 @@ pub struct LogArguments {
 /// Options for reading logs.
 #[derive(Clone, clap::Args)]
 pub struct Reading {
-    /// A TOML file that assigns fields of the logs to columns.
+    /// TOML file that assigns fields of the logs to columns.
     #[arg(long)]
     mapping: Option<PathBuf>,
     /// Read logs in which more than 5 % of the rows are unusable.
@@ -45,14 +48,14 @@ pub struct Reading {
     source: Vec<Asked>,
 }
 
-/// Flights read from the logs.
+/// Flights that were read and reconstructed from the logs.
 #[derive(Default)]
 pub struct Intake {
     /// The reconstructed flights, at least one.
     pub flights: Vec<Reconstruction>,
     /// Findings about the logs, and the reasons why logs were left out.
     pub notes: Vec<String>,
-    /// Whether a log was left out, or has a problem that makes the results wrong.
+    /// Whether a log was left out, or has a finding that makes the results wrong.
     pub in_doubt: bool,
 }
 
@@ -208,7 +211,7 @@ impl Reading {
     }
 }
 
-/// The error of a log that cannot be read. If wrong units explain it, the error names the command that corrects them.
+/// The error of a log that cannot be read. If wrong units explain the error, it names the command that corrects them.
 fn units_first(path: &Path, error: logs::LogError) -> anyhow::Error {
     let hint = match &error {
         logs::LogError::Csv { hint, .. } | logs::LogError::Unusable { hint, .. } => hint,
@@ -225,8 +228,8 @@ fn units_first(path: &Path, error: logs::LogError) -> anyhow::Error {
     )
 }
 
-/// Refuses a log with a problem that would make the results wrong. If a mapping can correct the log, the error names
-/// the command that writes it.
+/// Refuses a log with a problem (a finding that makes the results wrong). If a mapping can correct the log, the error names the
+/// command that writes the mapping.
 fn refuse_problems(path: &Path, findings: &[Finding]) -> Result<()> {
     let problems: Vec<&Finding> =
         findings.iter().filter(|f| f.severity == Severity::Problem).collect();
@@ -234,7 +237,7 @@ fn refuse_problems(path: &Path, findings: &[Finding]) -> Result<()> {
         return Ok(());
     }
     let log = quoted(path);
-    // A problem that a factor corrects is named by its column only. The command in the message explains the problem.
+    // For a problem that a factor corrects, the message names only the column. The command in the message explains the problem.
     let said = |f: &&Finding| match &f.cure {
         Some(cure) => {
             format!("{} has a wrong unit or sign (read it times {:.4})", cure.column, cure.scale)

@@ -1,4 +1,4 @@
-//! Ctrl-C during a long task: the task ends at its next safe point.
+//! Ctrl-C during a long task. It sets a flag, and the task ends where it next checks the flag and can be resumed.
 
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 
 use crate::commands::status;
 
-/// A flag that Ctrl-C sets.
+/// Flag that is set when Ctrl-C is pressed.
 #[derive(Clone, Debug, Default)]
 pub struct Interruption(Arc<AtomicBool>);
 
@@ -23,10 +23,10 @@ pub enum Ended {
 }
 
 impl Interruption {
-    /// Sets the handler of Ctrl-C and returns its flag. Call it once in a program.
+    /// Installs the handler of Ctrl-C and returns the flag that it sets. May be called only once in a program.
     ///
     /// # Errors
-    /// If the handler cannot be set.
+    /// If the handler cannot be installed.
     #[cfg(any(feature = "demo", feature = "study"))]
     pub fn watch() -> Result<Interruption> {
         let flag = Interruption::default();
@@ -36,7 +36,7 @@ impl Interruption {
         Ok(flag)
     }
 
-    /// Whether Ctrl-C was typed.
+    /// Whether Ctrl-C was pressed.
     #[cfg_attr(not(any(feature = "demo", feature = "learn")), expect(dead_code))]
     pub fn is_set(&self) -> bool {
         self.0.load(Ordering::Relaxed)

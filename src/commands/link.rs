@@ -27,7 +27,7 @@ use crate::model::GreyBox;
 use crate::physics::airframe::ActuatorFigures;
 use shown::{delay, latency, parameters};
 
-/// Writes a line; a closed output is not an error.
+/// Writes a line to `$out`. Errors, such as a closed pipe, are ignored.
 macro_rules! print_to {
     ($out:expr, $($words:tt)*) => {{
         let _ = writeln!($out, $($words)*);
@@ -37,10 +37,10 @@ use print_to;
 
 /// Time within which the flight controller must send a heartbeat.
 const HEARTBEAT_TIMEOUT: Duration = Duration::from_secs(4);
-/// Largest fraction of a serial port's data rate for state messages. The rest is for parameters, commands and routed
-/// messages.
+/// Largest fraction of a serial port's data rate that the state messages may use. The rest is for parameters, commands and
+/// routed messages.
 const BUDGET: f64 = 0.6;
-/// Fraction of the nominal rate below which a stream counts as missing.
+/// Fraction of its nominal rate below which a stream (a message that is sent periodically) counts as missing.
 const ENOUGH: f64 = 0.8;
 
 /// The arguments of `greylag link`.
@@ -73,7 +73,7 @@ struct Check {
     /// Quantity that will be commanded.
     #[arg(long, value_name = "WHAT", default_value = "surfaces", value_enum)]
     command: CommandName,
-    /// Controller whose delay margin is checked if surfaces are commanded.
+    /// Controller whose delay margin is compared with the delay of the link, if surfaces are commanded.
     #[arg(long, value_name = "NAME", default_value = "lqi", value_parser = choices::controller())]
     controller: ControllerKind,
     /// Duration of the measurement.
@@ -116,12 +116,13 @@ fn run_check(check: &Check) -> Result<ExitCode> {
     report(check, &real, &mut out)
 }
 
-/// The model as `greylag fly` flies it through a flight controller: no message of the link commands a rudder.
+/// Loads the model as `greylag fly` uses it with a flight controller: without a rudder, because no message of the link
+/// commands one.
 fn flown(file: &Path) -> Result<GreyBox> {
     Ok(fly::model(file, None)?.leaving_rudder())
 }
 
-/// An open link and the messages received on it.
+/// An open link, with the packets that arrive on it and the remarks of the network thread.
 struct Listener {
     started: Instant,
     arrivals: Receiver<Arrival>,
@@ -139,7 +140,7 @@ impl Listener {
         Ok(Listener { started, arrivals, link, remarks: Vec::new(), _network: network })
     }
 
-    /// The stack of the flight controller on the link.
+    /// Waits for the flight controller's heartbeat and returns its autopilot stack. Fails after `HEARTBEAT_TIMEOUT`.
     fn find(&mut self, command: CommandName, actuators: ActuatorFigures) -> Result<Stack> {
         let authority = command.authority();
         let guess = Profile { stack: Stack::Px4, authority, actuators };
@@ -194,12 +195,13 @@ struct Document {
     system: Option<u8>,
     armed: Option<bool>,
     loss: f64,
-    /// Median of the round trips of TIMESYNC, ms.
+    /// Median round-trip time of the TIMESYNC messages, ms.
     round_trip_ms: Option<f64>,
     streams: Vec<StreamRow>,
     parameters: Vec<String>,
     warning: Option<String>,
-    /// Reasons against flying the profile; empty if it can be flown.
+    /// Reasons why the flight controller cannot be flown with the profile (its stack and the commanded quantity). Empty if
+    /// it can.
     missing: Vec<String>,
 }
 
@@ -236,7 +238,8 @@ impl Document {
     }
 }
 
-/// Prints the results. The exit status is 1 if the profile cannot be flown.
+/// Prints the results and writes the JSON file. The exit status is 1 if the flight controller cannot be flown with the
+/// profile.
 fn report(check: &Check, real: &Real, out: &mut dyn Write) -> Result<ExitCode> {
     let Some((autopilot, armed)) = real.controller() else {
         bail!("the controller fell silent while it was measured: check cable and power");
@@ -336,7 +339,7 @@ fn streams(real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
                     remedy(real.profile().stack)
                 )
             });
-            // The text of a denial names all denied streams, so it is listed only once.
+            // Every refused stream has the same text, which names all of them. It is therefore listed only once.
             if !missing.contains(&words) {
                 missing.push(words);
             }
@@ -362,7 +365,7 @@ fn streams(real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
     }
 }
 
-/// Remedy for a stream that is too slow.
+/// Advice for the user if a stream is too slow.
 fn remedy(stack: Stack) -> &'static str {
     match stack {
         Stack::Px4 => "raise the port's data rate (MAV_1_RATE) or its baud rate",
@@ -374,7 +377,7 @@ fn remedy(stack: Stack) -> &'static str {
 mod tests {
     use super::*;
 
-    /// The check must use the same delay margin as the flight.
+    /// The check must use the same delay margin as the flight, which has no rudder.
     #[test]
     fn a_link_without_a_rudder_command_is_checked_without_a_rudder() {
         let file = Path::new("params/c172p/jsbsim.toml");

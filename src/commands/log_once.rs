@@ -1,12 +1,12 @@
-//! Prints each warning on standard error only once, because every worker that loads an aircraft issues the same warnings.
+//! Prints each warning on standard error only once, because every thread that loads an aircraft issues the same warnings.
 
 use std::collections::BTreeSet;
 use std::io::{self, Write};
 use std::sync::Mutex;
 
-/// Lines already printed.
+/// The lines that were printed, so that a repeated line is recognised.
 static PRINTED: Mutex<BTreeSet<Vec<u8>>> = Mutex::new(BTreeSet::new());
-/// Largest number of stored lines. Further lines are printed each time.
+/// Largest number of stored lines. After that, every line is printed, including repeated ones.
 const REMEMBERED: usize = 1000;
 
 /// A writer to standard error that omits repeated lines.
@@ -15,8 +15,8 @@ pub struct LogOnce;
 impl Write for LogOnce {
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
         if is_new(line) {
-            // A closed standard error is ignored: the logger would report this error with `eprintln!`, which panics
-            // there and ends the thread that warns.
+            // An error of this write is ignored. Standard error may be closed, and then the logger would report the error
+            // with `eprintln!`. That would panic and end the thread that issued the warning.
             let _ = io::stderr().write_all(line);
         }
         Ok(line.len())

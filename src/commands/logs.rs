@@ -31,8 +31,8 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Show what logs hold, with rates and gaps, and which data each log lacks for which purpose. Exit
-    /// status 3 if a log has a problem that makes its numbers wrong.
+    /// Show what logs hold, with rates and gaps, and which data each log lacks for which purpose. The
+    /// exit status is 3 if a log cannot be read or has a problem that makes its numbers wrong.
     Info {
         /// CSV, PX4 ULog, ArduPilot .bin, MAVLink .tlog or ROS 2 bag (.mcap), distinguished by content.
         #[arg(required = true)]
@@ -40,8 +40,8 @@ enum Verb {
         /// Print JSON: one object, or for several logs a list of objects.
         #[arg(long)]
         json: bool,
-        /// Write a mapping file that corrects the wrong units and signs that were found, for the
-        /// option --mapping.
+        /// Write a mapping file that corrects the wrong units and signs that were found. Other commands
+        /// read it by --mapping.
         #[arg(long, value_name = "FILE", conflicts_with = "json")]
         write_mapping: Option<PathBuf>,
         /// Model file of the aircraft, whose envelope sets the airspeed above which rows count as
@@ -68,13 +68,13 @@ enum Verb {
         reading: Reading,
     },
     /// Reconstruct the flight path of a log: write the states without sensor errors as a CSV table and
-    /// print sensor errors, wind and clock skews with their standard deviations.
+    /// print sensor errors, wind and delays between sensors with their standard deviations.
     Reconstruct {
         /// CSV, PX4 ULog, ArduPilot .bin, MAVLink .tlog or ROS 2 bag (.mcap), distinguished by content.
         input: PathBuf,
-        /// The CSV table to write, with the columns of the log format.
+        /// The CSV table to write, with the columns of a Greylag log.
         output: PathBuf,
-        /// The model file of the aircraft: its actuators turn commands into deflections.
+        /// Model file of the aircraft. Its actuators turn logged commands into deflections.
         #[arg(long, default_value = "params/x8/prior.toml")]
         model: PathBuf,
         /// Replace the table if it exists.
@@ -90,20 +90,21 @@ struct Reading {
     /// A TOML file that assigns fields of the logs to columns.
     #[arg(long)]
     mapping: Option<PathBuf>,
-    /// Airframe file whose [surfaces] and [motors] the log names.
+    /// Airframe file whose [surfaces] and [motors] state what the logged actuators drive.
     #[arg(long, value_name = "FILE")]
     airframe: Option<PathBuf>,
-    /// Read the log however many of its rows are unusable.
+    /// Read the log no matter how many of its rows are unusable.
     #[arg(long)]
     lenient: bool,
-    /// The instance of a topic to read instead of the one that the reader chooses: airspeed=1, or
+    /// Read this instance of a topic instead of the one that the reader chooses: airspeed=1, or
     /// ATTITUDE=2/1 (system/component).
     #[arg(long, value_name = "TOPIC=INSTANCE")]
     source: Vec<Asked>,
 }
 
 impl Reading {
-    /// The reader settings for logs of the aircraft of `model`; `None` if the model is not given.
+    /// The settings for reading logs. If `model` is given, its envelope sets the airspeed above which the aircraft counts as
+    /// flying, and its mixer applies unless `--airframe` has one.
     fn options(&self, model: Option<&GreyBox>) -> Result<Options> {
         let mapping = self.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
         let airframe = self.airframe.as_deref().map(|path| Airframe::load(&files::shipped(path)));
@@ -164,7 +165,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
 }
 
-/// The flights of the logs in `files`, and whether a log could not be read. Errors are printed to standard error.
+/// The flights of the logs in `files`, and whether any log could not be read. Errors of such logs are printed to standard
+/// error.
 ///
 /// # Errors
 /// The error of the last log if none can be read.
@@ -184,7 +186,7 @@ fn inspected(files: &[PathBuf], options: &Options) -> Result<(Vec<Log>, bool)> {
     }
 }
 
-/// Writes the mapping that corrects the findings.
+/// Writes the mapping file that corrects the wrong units and signs found in `logs`.
 fn write_mapping_file(path: &Path, logs: &[Info]) -> Result<()> {
     let Some(text) = mapping(logs) else {
         bail!("no factor puts anything of these logs right, so no mapping was written");
@@ -201,7 +203,7 @@ fn csv_file(flight: &Flight, output: &Path, force: bool) -> Result<()> {
     files::write(output, &text, force.into())
 }
 
-/// Number of decimals, 5 to 9, with which a standard deviation `sd` is shown with two digits.
+/// Number of decimals for the standard deviation `sd`: enough for one or two significant digits, at least 5, at most 9.
 fn decimals(sd: f64) -> usize {
     if sd > 0.0 { (1.0 - sd.log10()).clamp(5.0, 9.0) as usize } else { 5 }
 }
@@ -228,7 +230,7 @@ fn convert(log: &Log, output: &Path, force: bool) -> Result<ExitCode> {
     Ok(status(Some(Info::of(log).severity())))
 }
 
-/// Exit status for the most severe finding.
+/// Exit status for the severity of the most severe finding.
 fn status(worst: Option<Severity>) -> ExitCode {
     match worst {
         Some(Severity::Problem) => ExitCode::from(IN_DOUBT),
@@ -300,7 +302,7 @@ fn print(info: &Info) {
     }
 }
 
-/// Prints for each purpose what the log lacks.
+/// Prints which purposes the log serves, and what it lacks for the others.
 fn print_purposes(info: &Info) {
     println!("\nServes for");
     for purpose in &info.purposes {
@@ -314,7 +316,7 @@ fn print_purposes(info: &Info) {
     }
 }
 
-/// Prints the instances of topics that have several.
+/// Prints the instances of the topics that occur several times in the log.
 fn print_sources(info: &Info) {
     if info.sources.is_empty() {
         return;

@@ -17,7 +17,7 @@ pub struct Arguments {
     folder: PathBuf,
 }
 
-/// Writes the manual pages of `command`.
+/// Writes the manual pages of `command` and, with the feature `demo`, of the simulator.
 ///
 /// # Errors
 /// If the folder cannot be written.

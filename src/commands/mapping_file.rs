@@ -1,20 +1,20 @@
-//! A mapping file that corrects wrong units and signs of logs.
+//! Text of a mapping file: it multiplies columns of logs by factors that correct wrong units and signs.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use crate::logs::info::Info;
 
-/// Columns that share a unit. A finding names only the first column of a group.
+/// Columns that share a unit. A finding of a wrong unit names only the first column of a group.
 const ALIKE: [(&str, [&str; 2]); 2] =
     [("roll_rad", ["pitch_rad", "yaw_rad"]), ("p_radps", ["q_radps", "r_radps"])];
 
-/// The text of the mapping; `None` if no finding can be corrected by a factor.
+/// The mapping that corrects the findings about `logs`; `None` if no finding can be corrected by a factor.
 pub fn mapping(logs: &[Info]) -> Option<String> {
     let mut columns = BTreeMap::new();
     for log in logs {
         let cures = || log.findings.iter().filter_map(|f| f.cure.as_ref());
-        // signs can be checked only with correct units
+        // a finding about a sign is reliable only if the units are right, so that wrong units are corrected first
         let units = cures().any(|cure| cure.scale > 0.0);
         for cure in cures().filter(|cure| !units || cure.scale > 0.0) {
             let column = cure.column.as_str();

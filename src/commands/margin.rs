@@ -1,4 +1,4 @@
-//! Delay margin of a controller, for flights through a flight controller's channels.
+//! Delay margin of a controller, for flights in which a flight controller passes the commands to the surfaces.
 
 use std::time::Duration;
 
@@ -8,10 +8,11 @@ use crate::control::{ControllerKind, Pace, build};
 use crate::flight::delay_margin;
 use crate::model::{GreyBox, TrimError};
 
-/// The delay margin of `kind` on `model`: the smallest delay at which its loop oscillates. For planners and policies it
-/// is the delay margin of the LQI, which is their fallback. A planner takes too long to simulate, and a policy has no
-/// loop design. `None` if the LQI cannot be designed, if the loop is stable up to the largest delay simulated, or if the
-/// model has no trim, which is reported on standard error.
+/// The delay margin of `kind` on `model`: the smallest delay at which the pitch or roll loop oscillates. For a planner or a
+/// policy it is the delay margin of the LQI, which is the fallback controller. A planner would take too long to simulate.
+///
+/// `None` if the LQI cannot be designed, if the loops are stable up to the largest simulated delay, or if the model cannot
+/// be trimmed. The last case is reported on standard error.
 ///
 /// # Errors
 /// If the controller cannot be built.
@@ -26,14 +27,14 @@ pub fn of(kind: ControllerKind, model: &GreyBox) -> Result<Option<Duration>> {
     let kind = if designed && kind.pace() != Pace::Planned { kind } else { ControllerKind::Lqi };
     match build(kind, model) {
         Ok(controller) => Ok(or_unknown(delay_margin(controller.as_ref(), model))),
-        // If there is no LQI, its substitute was reported already, and the delay margin is unknown.
+        // Without an LQI the delay margin is unknown.
         Err(_) if !designed => Ok(None),
         Err(why) => Err(why.into()),
     }
 }
 
-/// The delay margin that a search found. If there was no trim to search from, the margin is unknown, with a line on
-/// standard error.
+/// Returns the delay margin that was found. If the model could not be trimmed, the margin is unknown: prints a line on
+/// standard error and returns `None`.
 fn or_unknown(found: Result<Option<Duration>, TrimError>) -> Option<Duration> {
     found.unwrap_or_else(|why| {
         eprintln!("greylag: the delay margin is unknown, so delays are not checked: {why}");

@@ -1,10 +1,11 @@
-//! Text of an error for the user: each cause once, and only a remedy that applies.
+//! Text of an error for the user. It states each cause once. If the operating system's error code names a remedy, general
+//! remedies are left out.
 
 use std::io::{self, ErrorKind};
 
 use super::one_line::one_line;
 
-/// General remedies in error texts. A remedy for the actual cause replaces them.
+/// General remedies that error texts contain. [`text`] replaces them by the remedy of [`cure`], if there is one.
 const ANY_CURE: [&str; 4] = [
     ": check the path and its permissions",
     "; check that its folder exists, can be written to and has room",
@@ -12,7 +13,7 @@ const ANY_CURE: [&str; 4] = [
     "; name a file that exists",
 ];
 
-/// Text of `error` as it is printed.
+/// Text of `error` as it is printed, in one line.
 pub fn text(error: &anyhow::Error) -> String {
     let text = one_line(error);
     let system = error.chain().find_map(|cause| cause.downcast_ref::<io::Error>());
@@ -22,7 +23,7 @@ pub fn text(error: &anyhow::Error) -> String {
     }
 }
 
-/// Remedy for an error of the operating system; `None` if the system's text must suffice.
+/// Remedy for an operating-system error of this kind; `None` if there is none.
 fn cure(kind: ErrorKind) -> Option<&'static str> {
     match kind {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
@@ -38,7 +39,7 @@ fn cure(kind: ErrorKind) -> Option<&'static str> {
     }
 }
 
-/// The text without the numbers that the system gives its errors.
+/// The text without the operating system's error numbers, such as `(os error 28)`.
 fn without_numbers(mut text: String) -> String {
     while let Some(from) = text.find(" (os error ") {
         let Some(length) = text[from..].find(')') else { break };
@@ -47,7 +48,7 @@ fn without_numbers(mut text: String) -> String {
     text
 }
 
-/// The text without general remedies, error numbers of the system and names of temporary files.
+/// The text without general remedies, the operating system's error numbers and the path of a temporary file.
 fn plain(text: &str) -> String {
     let mut text = ANY_CURE.iter().fold(text.to_owned(), |text, any| text.replace(any, ""));
     text = without_numbers(text);
@@ -69,7 +70,7 @@ mod tests {
             assert_eq!(system.kind(), kind);
             super::text(&anyhow::Error::new(system).context(text.to_owned()))
         };
-        // ENOSPC, EACCES, ENOENT
+        // the codes 28, 13 and 2 are ENOSPC, EACCES and ENOENT of Linux
         let full = text_of(
             ErrorKind::StorageFull,
             28,

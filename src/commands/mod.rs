@@ -125,7 +125,7 @@ enum Command {
     /// Refit a model to flights and add missing effects to it, judged on flights that the fit has not seen.
     #[cfg(feature = "study")]
     Amend(amend::Arguments),
-    /// Run a campaign over priors, controllers and seeds; gather and tabulate the results.
+    /// Run a campaign, many runs with different models, controllers and random seeds, and tabulate the results.
     #[cfg(feature = "study")]
     Campaign(campaign::Arguments),
     /// Fly exploration flights in JSBSim, from which models are learned.
@@ -136,25 +136,25 @@ enum Command {
     /// Write completions for a shell to standard output.
     #[cfg(feature = "study")]
     Completions(completions::Arguments),
-    /// Fly a schedule of easy and hard attitudes: simulator, companion and client in one program.
+    /// Demonstrate the companion: it flies a sequence of attitudes, with simulator and client in the same program.
     #[cfg(feature = "demo")]
     Demo(demo::Arguments),
     /// Show the catalogue of physical effects.
     #[cfg(feature = "study")]
     Effects(effects::Arguments),
-    /// Find the manoeuvre that distinguishes two missing effects, as a schedule to fly.
+    /// Find the manoeuvre that best shows which of two effects a model lacks, and write it as a schedule.
     #[cfg(all(feature = "demo", feature = "study"))]
     Design(design::Arguments),
     /// Name the physical effect that a model lacks, from flight logs.
     #[cfg(feature = "study")]
     Diagnose(diagnose::Arguments),
-    /// Score controllers on the target file, flown in JSBSim in this process.
+    /// Fly controllers to the target attitudes of a file, in JSBSim inside this process, and score them.
     #[cfg(feature = "demo")]
     Evaluate(evaluate::Arguments),
-    /// Fly many seeded flights under faults of link, sensors and clocks, and check them.
+    /// Fly many simulated flights with random faults of link, sensors and clocks, and check safety requirements.
     #[cfg(feature = "demo")]
     Faults(faults::Arguments),
-    /// Fly a vehicle, serving ground stations and offboard programs.
+    /// Fly a vehicle as its companion; ground stations and offboard programs connect to it.
     Fly(fly::Arguments),
     /// Learn a controller from a prior model in one command: flights, model, policy.
     #[cfg(feature = "learn")]
@@ -172,12 +172,12 @@ enum Command {
     /// Write the manual pages of every subcommand into a folder.
     #[cfg(feature = "study")]
     Man(man::Arguments),
-    /// Replay a recorded flight, and compare the pilot's commands bit by bit.
+    /// Recompute the companion's commands of a recorded flight, and compare them with the recorded ones bit by bit.
     Replay(replay::Arguments),
-    /// Draw a recorded flight as a page: attitude, commands, timing, the model's error.
+    /// Draw a recorded flight as an HTML page: attitude, commands, timing, and prediction errors of the model.
     #[cfg(feature = "demo")]
     Report(report::Arguments),
-    /// Write a target file.
+    /// Write a file of random target attitudes for `evaluate`.
     #[cfg(feature = "demo")]
     Targets(targets::Arguments),
     /// Learn a model from flights, or a policy in a model.
@@ -207,8 +207,8 @@ fn parse() -> Arguments {
     <Arguments as clap::FromArgMatches>::from_arg_matches(&found).unwrap_or_else(|e| e.exit())
 }
 
-/// The command with negative numbers allowed for all options that take a value. The parser of an option checks the
-/// range.
+/// Returns `command` with negative numbers allowed as values of its options and of those of its subcommands. Whether a
+/// value is in range is checked later.
 fn with_signs(command: clap::Command) -> clap::Command {
     let takes = |a: &clap::Arg| a.get_action().takes_values() && !a.is_positional();
     let command = command.mut_args(|a| if takes(&a) { a.allow_negative_numbers(true) } else { a });
@@ -225,7 +225,7 @@ pub fn main() -> ExitCode {
         (_, 1) => LevelFilter::INFO,
         (_, 2..) => LevelFilter::DEBUG,
     };
-    // notes of this program replace the warnings of the JSBSim library on an aircraft's XML
+    // at the default level, JSBSim's warnings about an aircraft's XML file are hidden, because this program prints its own
     let port = if level == LevelFilter::WARN { LevelFilter::OFF } else { level };
     let asked = std::env::var("RUST_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
     let filter =
@@ -235,7 +235,7 @@ pub fn main() -> ExitCode {
         .with_ansi(std::io::stderr().is_terminal())
         .with_writer(|| log_once::LogOnce);
     tracing_subscriber::registry().with(filter).with(lines).init();
-    // a flight must continue after the reader of its output has ended
+    // a flight must continue when the program that reads its output ends
     if !matches!(command, Command::Fly(_)) {
         end_with_the_reader();
     }
@@ -309,7 +309,8 @@ fn command_of(line: &[OsString]) -> Result<Command> {
     Ok(<Arguments as clap::FromArgMatches>::from_arg_matches(&found)?.command)
 }
 
-/// Checks that a line is a stage of `greylag learn` or a campaign cell.
+/// Checks that the arguments `line` can be a stage of `greylag learn` or a cell (a run) of a campaign. These may collect
+/// flights, evaluate controllers or train.
 #[cfg(feature = "study")]
 fn check_line(line: &[OsString]) -> Result<()> {
     match command_of(line)? {
@@ -321,7 +322,7 @@ fn check_line(line: &[OsString]) -> Result<()> {
     }
 }
 
-/// Runs a stage of `greylag learn` or a campaign cell until `stop` is set. An evaluation ignores `stop`.
+/// Runs a stage of `greylag learn` or a cell of a campaign until it ends or `stop` is set. An evaluation ignores `stop`.
 #[cfg(feature = "study")]
 #[cfg_attr(not(any(feature = "demo", feature = "learn")), expect(unused_variables))]
 fn carry_out(line: &[OsString], stop: &Interruption) -> Result<Ended> {

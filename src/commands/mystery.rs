@@ -1,4 +1,7 @@
-//! `greylag mystery`: makes flights of an aircraft with an effect that its model lacks.
+//! `greylag mystery`: makes a blind test of `greylag diagnose`, and later reveals the answer.
+//!
+//! It flies the simulated aircraft with one effect (a term of the forces or moments) that the supplied model lacks. It writes the
+//! logs, the model and the answer (the effect, in coded form) into a folder.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -21,11 +24,11 @@ use crate::sim::missing::{Craft, Missing, MissingKind};
 use crate::sim::starting_model::starting_model;
 use crate::sim::trial::{Subject, Trial};
 
-/// File name of the sealed answer.
+/// Name of the file with the answer in coded form.
 const SEALED: &str = "answer.sealed";
 /// File name of the diagnosis that is compared with the answer.
 const DIAGNOSIS: &str = "diagnosis.json";
-/// Schema of the answer.
+/// Name and version of the answer's format.
 const SCHEMA: &str = "greylag.mystery/1";
 
 /// Options of `greylag mystery`.
@@ -35,14 +38,15 @@ pub struct Arguments {
     /// sensors.
     #[arg(long, required_unless_present = "open")]
     seed: Option<u64>,
-    /// New folder for the logs, the model and the sealed answer.
+    /// New folder for the logs, the model and the answer in coded form.
     #[arg(long, value_name = "DIR", required_unless_present = "open")]
     out: Option<PathBuf>,
-    /// Exact model of the simulator's aircraft. The effect is hidden in the aircraft, and the folder receives this model
-    /// with errors in its coefficients and a copy of its airframe.
+    /// Exact model of the simulator's aircraft. The folder receives a copy without the hidden effect and with errors in the
+    /// coefficients, and a copy of the airframe file.
     #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
     model: PathBuf,
-    /// Folder that holds NAME/NAME.xml; without it an aircraft built into the program flies.
+    /// Folder that contains NAME/NAME.xml, the JSBSim file of --aircraft; without this option the aircraft is one of those
+    /// built into the program.
     #[arg(long, value_name = "DIR", requires = "aircraft")]
     aircraft_dir: Option<PathBuf>,
     /// Name of the simulator's aircraft that the model describes [default: x8].
@@ -52,13 +56,13 @@ pub struct Arguments {
     /// effects.
     #[arg(long, value_name = "ID", group = "what")]
     effect: Option<String>,
-    /// Hide the effect of this file, with the values that the file has.
+    /// Hide the effect that this effect file defines, with the coefficients given in the file.
     #[arg(long, value_name = "FILE", group = "what")]
     hide: Option<PathBuf>,
-    /// Amplitude in the effect's unit; for an effect of a file, the value of its first coefficient.
+    /// Amplitude of the hidden effect in its unit; for an effect of a file, the value of its first coefficient.
     #[arg(long, requires = "what", allow_negative_numbers = true, value_parser = finite)]
     amplitude: Option<f64>,
-    /// Fly in MIL-spec turbulence: 3 light, 4 moderate.
+    /// Severity of MIL-spec turbulence in the flights, such as 3 (light) or 4 (moderate) [default: no turbulence].
     #[arg(long, value_name = "1..7", value_parser = clap::value_parser!(u8).range(1..=7))]
     turbulence_severity: Option<u8>,
     /// Controller of the flights. `any` and `adaptive` use no model: they need only the cruise airspeed and whether the aircraft
@@ -87,14 +91,15 @@ struct Answer {
     id: String,
     amplitude: f64,
     unit: String,
-    /// Names and values of the catalogue entry's constants.
+    /// Names and true values of the effect's coefficients; empty if the catalogue's effect only approximates the hidden one.
     parameters: Vec<(String, f64)>,
 }
 
-/// Writes a folder with a hidden effect, or reveals the hidden effect of a folder.
+/// Makes the folder of a blind test, or reveals the hidden effect of such a folder.
 ///
 /// # Errors
-/// If the folder exists, the effect cannot be hidden or flown with, or there is no answer to open.
+/// If the folder to be made exists, or the aircraft cannot be flown with the effect. If the answer cannot be read, or there is
+/// no diagnosis yet and `--give-up` is not given.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match (&arguments.open, arguments.seed, &arguments.out) {
         (Some(folder), _, _) if !arguments.give_up && undiagnosed(folder) => bail!(
@@ -128,7 +133,7 @@ fn make(arguments: &Arguments, seed: u64, out: &Path) -> Result<ExitCode> {
         turbulence: arguments.turbulence_severity,
         installed: Installation::TRUE,
     };
-    // The folder is written under another name first. Its final name then denotes a complete folder or no folder.
+    // The files are written into a temporary folder, which is renamed at the end. A folder named `out` is thus complete.
     let beside = tempfile::Builder::new().prefix(".mystery").tempdir_in(parent);
     let beside = beside.with_context(|| {
         format!("cannot make a folder in {}, so name another place with --out", parent.display())
@@ -172,7 +177,7 @@ fn subject(arguments: &Arguments, reference: &GreyBox) -> Result<Subject> {
         .map_err(|why| anyhow!("the airframe of model {}: {why}", reference.name))
 }
 
-/// The text of the airframe file that the model file at `path` names.
+/// The text of the airframe file that a model file names. `path` is the path of the model file, `model` its text.
 fn airframe(path: &Path, model: &str) -> Result<String> {
     #[derive(Deserialize)]
     struct Named {
@@ -183,7 +188,7 @@ fn airframe(path: &Path, model: &str) -> Result<String> {
     std::fs::read_to_string(&path).with_context(|| format!("reading {}", path.display()))
 }
 
-/// The effect to hide: from an effect file, by its id, or drawn at random.
+/// The effect to hide: the effect of a given file, the one with a given id, or one drawn from `seed`.
 fn missing(arguments: &Arguments, reference: &GreyBox, seed: u64) -> Result<Missing> {
     let Some(file) = &arguments.hide else {
         let craft = Craft::of(reference);
@@ -230,13 +235,13 @@ fn unit(id: &str) -> &'static str {
     MissingKind::from_id(id).map(|kind| kind.unit).or_else(of_file).unwrap_or_default()
 }
 
-/// The names of the constants of the catalogue's effect `id`.
+/// The names of the coefficients of the effect `id`; empty if the catalogue does not have it.
 fn coefficient_names(id: &str) -> Vec<&'static str> {
     catalogue::describe(id)
         .map_or(Vec::new(), |about| about.coefficients.iter().map(|c| c.name).collect())
 }
 
-/// JSON in hexadecimal digits. The digits keep a user from reading the answer by accident.
+/// The answer as JSON in hexadecimal digits, so that a user does not read it by accident.
 fn seal(answer: &Answer) -> Result<String> {
     let mut out = String::new();
     for line in serde_json::to_vec(answer)?.chunks(32) {
@@ -278,7 +283,7 @@ fn readme(out: &Path) -> String {
     )
 }
 
-/// Whether a folder has an answer and no diagnosis to compare it with.
+/// Whether the folder contains an answer, but no diagnosis for comparison.
 fn undiagnosed(folder: &Path) -> bool {
     folder.join(SEALED).exists() && !folder.join(DIAGNOSIS).exists()
 }
@@ -304,7 +309,7 @@ fn open(folder: &Path) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Prints the answer and the diagnosis for comparison.
+/// Prints a comparison of the answer with the diagnosis `said`.
 fn beside(answer: &Answer, said: &serde_json::Value) {
     let none = Vec::new();
     let effects = said["effects"].as_array().unwrap_or(&none);
@@ -327,7 +332,7 @@ fn beside(answer: &Answer, said: &serde_json::Value) {
     table.column_iter_mut().skip(1).for_each(|c| c.set_cell_alignment(CellAlignment::Right));
     for parameter in effect["parameters"].as_array().unwrap_or(&none) {
         let name = parameter["name"].as_str().unwrap_or("?");
-        // names may have the effect's id as a prefix, as in model files
+        // a name may begin with the effect's id and a dot, as in model files
         let own = name.rsplit('.').next().unwrap_or(name);
         let hidden = answer.parameters.iter().find(|(n, _)| n == own).map(|(_, v)| *v);
         let number = |x: Option<f64>| x.map_or("–".into(), |x| format!("{x:.4}"));

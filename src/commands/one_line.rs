@@ -1,4 +1,4 @@
-//! One-line text of an error and its causes without repetition.
+//! Text of an error with its causes, on one line and without repetition.
 
 /// Joins `error` and its causes in one line. A cause that the text already contains is omitted.
 pub fn one_line(error: &anyhow::Error) -> String {

@@ -1,13 +1,13 @@
-//! Options for constants that may differ from flight to flight.
+//! Options of a fit: constants that are estimated for each flight, and the use of sensor errors common to all flights.
 
 use crate::sysid::per_flight::{PerFlight, SensorErrors};
 
-/// Largest standard deviation of an angle, °. Beyond this value the small-angle approximation fails.
+/// Largest standard deviation of a misalignment angle, °. For larger angles the small-angle approximation is inaccurate.
 const MOST_DEG: f64 = 10.0;
-/// Largest factor on the standard deviations of the trims.
+/// Largest factor on the prior standard deviations of the trim coefficients.
 const MOST_TIMES: f64 = 100.0;
 
-/// Constants that may differ from flight to flight.
+/// Options for the constants that are estimated for each flight.
 #[derive(clap::Args, Clone, Copy, Debug)]
 pub struct PerFlightArguments {
     /// Estimate trims for each flight (CD0, CL0, CY0, Cl0, Cm0, Cn0, a fraction of the thrust) together
@@ -21,12 +21,13 @@ pub struct PerFlightArguments {
     axes_askew: Option<f64>,
 }
 
-/// Constants of the flights and of the installation that a fit estimates.
+/// Options for the constants of each flight and for the sensor errors common to all flights.
 #[derive(clap::Args, Clone, Copy, Debug)]
 pub struct FitConstantsArguments {
     #[command(flatten)]
     per_flight: PerFlightArguments,
-    /// Errors of airspeed, angle of attack and sideslip that the fitted flights have in common.
+    /// Use of the errors of airspeed, angle of attack and sideslip that the fitted flights have in common. As errors of the
+    /// installation they also correct flights that were not fitted.
     #[arg(long, value_enum, value_name = "USE", default_value = "judged")]
     sensor_errors: Use,
 }
@@ -34,11 +35,11 @@ pub struct FitConstantsArguments {
 /// Use of the sensor errors that the fitted flights have in common.
 #[derive(clap::ValueEnum, Clone, Copy, Debug)]
 enum Use {
-    /// Kept as errors of the installation if the error of the held-out flights then falls by more than 1 %.
+    /// Kept as errors of the installation if the model's error on the flights not fitted then falls by more than 1 %.
     Judged,
-    /// Kept unless the error of the held-out flights then rises.
+    /// Kept as errors of the installation unless the model's error on the flights not fitted then rises.
     Kept,
-    /// Used for the fitted flights only.
+    /// Used to correct the fitted flights only.
     Dropped,
 }
 

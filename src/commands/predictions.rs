@@ -1,4 +1,5 @@
-//! Free runs (open-loop simulations) as a table: the predictions of a model from every start of a flight.
+//! A table of free runs (open-loop simulations from measured states): the predictions of models from regular starts in each
+//! flight.
 
 use std::fmt::Write;
 
@@ -13,7 +14,7 @@ use crate::sysid::weak_form::prepared::Prepared;
 /// Half width of a 95 % interval of the normal distribution, in standard deviations.
 const NORMAL_95: f64 = 1.96;
 
-/// A predicted and a measured state at one horizon after one start.
+/// Predicted and measured state at one horizon after one start.
 struct Row<'a> {
     model: &'a str,
     flight: String,
@@ -24,9 +25,9 @@ struct Row<'a> {
     measured: [f64; 8],
 }
 
-/// The predictions of `models` for `flights` at `horizons_s` (s) after every start, as CSV with a row for each model,
-/// flight, start and horizon. A run that has diverged has no row. The 95 % interval of a state is computed from the
-/// errors of the same model at the same horizon over all other starts.
+/// The predictions of `models` for `flights` at `horizons_s` (s) after every start, as CSV with a row for each model, flight,
+/// start and horizon. A run has no row at horizons after its divergence or after the end of its segment. The 95 % interval of a
+/// state is computed from the errors of the same model at the same horizon in all other runs.
 pub fn table(models: &[GreyBox], flights: &[Reconstruction], horizons_s: &[f64]) -> Result<String> {
     let longest = horizons_s.iter().copied().fold(0.0, f64::max);
     let mut text = header();
@@ -49,7 +50,7 @@ pub fn table(models: &[GreyBox], flights: &[Reconstruction], horizons_s: &[f64])
     Ok(text)
 }
 
-/// `model`, and if its file has constants of `flights`, also a copy without these constants.
+/// `model`. If its file has constants of `flights` (trims, sensor errors), also a copy without these constants.
 fn with_and_without(model: &GreyBox, flights: &[Reconstruction]) -> Vec<GreyBox> {
     let mut all = vec![model.clone()];
     if flights.iter().any(|f| model.known.of(&f.name).is_some()) {
@@ -71,7 +72,7 @@ fn header() -> String {
     names.join(",") + "\n"
 }
 
-/// Times (s) at which free runs start, the same as in `compare`.
+/// Times (s) at which free runs start. `greylag compare` uses the same times.
 fn starts(flight: &Prepared) -> Vec<f64> {
     let every = ((START_EVERY_S / flight.dt).round() as usize).max(1);
     let of = flight.segments.iter().flat_map(|s| s.iter().take(s.len() - 1).step_by(every));
@@ -105,7 +106,7 @@ fn run<'a>(
     horizons_s.iter().enumerate().filter_map(at).collect()
 }
 
-/// A name as a field of the table: in quotes if it holds a comma, a quote or a line break (RFC 4180).
+/// `name` as a field of the table: in quotes if it contains a comma, a quote or a line break (RFC 4180).
 fn field(name: &str) -> String {
     match name.contains([',', '"', '\n', '\r']) {
         true => format!("\"{}\"", name.replace('"', "\"\"")),

@@ -1,4 +1,5 @@
-//! `greylag propose`: searches for a formula for errors that no effect of the catalogue explains.
+//! `greylag propose`: searches for a formula that describes those errors of a model that no effect of the catalogue
+//! explains.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -39,13 +40,13 @@ pub struct Arguments {
     /// Effect files (TOML) or folders of them, tried as candidates in addition to the catalogue.
     #[arg(long = "effect", value_name = "FILE", num_args = 1..)]
     effects: Vec<String>,
-    /// Ids of effects of the catalogue that are not tried.
+    /// Ids of effects of the catalogue that are not tried as candidates.
     #[arg(long, num_args = 1..)]
     without: Vec<String>,
-    /// Try only the shapes of the library, and no free forms.
+    /// Try only the function shapes of the built-in library; do not search for free formulas.
     #[arg(long)]
     library_only: bool,
-    /// Bootstrap draws under the null hypothesis (no effect missing) that set the thresholds.
+    /// Number of bootstrap draws under the null hypothesis (no effect missing). They determine the thresholds.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(20..))]
     nulls: u16,
     /// Seed of all random draws.
@@ -108,7 +109,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// Logs for the search and logs for the test. If none is held out, the last log is for the test.
+/// Divides the logs into those for the search and those for the test. If no log is held out by `--hold-out`, the last log is
+/// for the test.
 fn divided(arguments: &Arguments) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
     let (logs, held) = (&arguments.logs.paths, &arguments.hold_out);
     distinct(logs, held)?;
@@ -135,7 +137,7 @@ fn print(proposal: &Proposal) {
     proposal.notes.iter().for_each(|note| println!("note: {note}"));
 }
 
-/// Table of the formulas by size.
+/// Table of the best formulas, one row for each size. `evidence` is the heading of the column with the evidence.
 fn front(rungs: &[Rung], evidence: &str) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);

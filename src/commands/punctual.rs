@@ -1,15 +1,16 @@
-//! Timing jitter of this computer, measured at the start of a flight, with advice.
+//! Wake-up latency of this computer, measured at the start of a flight, with advice. The latency is the delay with which a
+//! thread continues after a sleep of 10 ms.
 
 use std::time::Duration;
 
 use crate::commands::terminal::{complain, say};
 use crate::flight::runtime::{Class, Punctuality, take_real_time};
 
-/// Duration of the measurement: two hundred cycles of 10 ms.
+/// Duration of the measurement: 200 sleeps of 10 ms.
 const MEASURED: Duration = Duration::from_secs(2);
 
-/// Sets and returns the scheduling class of the flight: real time if `wanted` and permitted. Threads started later
-/// inherit the class.
+/// Sets and returns the scheduling class of the calling thread: real time if `wanted` and permitted by the system. Threads
+/// that this thread starts later inherit the class.
 pub fn class(wanted: bool) -> Class {
     if !wanted {
         return Class::Usual;
@@ -26,7 +27,8 @@ pub fn class(wanted: bool) -> Class {
     }
 }
 
-/// Measures the timing jitter of this computer for 2 s during the flight, then prints it with advice.
+/// Starts a thread that measures the wake-up latency for 2 s and then prints it with advice. `class` is the scheduling class
+/// of the calling thread.
 pub fn print_timing(class: Class) {
     let measured = move || {
         let punctuality = Punctuality::measure(MEASURED);

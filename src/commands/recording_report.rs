@@ -1,4 +1,5 @@
-//! Reads a recording and draws its report.
+//! Reads the recording of a flight and makes its report. The settled error of a target attitude is the mean of the RMS
+//! errors of roll and pitch in the last fifth of the time for which the target was commanded.
 
 use std::path::Path;
 
@@ -22,8 +23,8 @@ use crate::sim::episode::{attitude_error_deg, settled_error_deg};
 use crate::sysid::compare::{self, Comparison};
 use crate::sysid::flight_path;
 
-/// Largest settled error that counts as tracked, degrees: half of what the paper calls
-/// "near-perfect tracking" (its section V-E).
+/// Largest settled error that counts as tracked, degrees: half of what section V-E of \[GSFM26\] calls "near-perfect
+/// tracking".
 pub const TOLERANCE_DEG: f64 = 0.5;
 
 /// Inputs of the report besides the recording.
@@ -38,7 +39,7 @@ pub struct Reporter<'a> {
     pub model_file: &'a Path,
     /// Seed of all random numbers; `None` if it is unknown.
     pub seed: Option<u64>,
-    /// The attitudes that were to be tracked.
+    /// The parts of the flight with a constant target attitude.
     pub segments: Vec<Segment>,
     /// Texts that the companion sent, with their times, s.
     pub texts: Vec<(f64, String)>,
@@ -104,12 +105,12 @@ impl Reporter<'_> {
     }
 }
 
-/// Number of control cycles after a new target at which the planner's candidates are taken. By then the plan has begun to
-/// move the aircraft.
+/// Number of control cycles from a new target to the cycle whose candidate plans are reported. By then the plan has begun
+/// to move the aircraft.
 const REPORTED_AFTER: usize = 20;
 
-/// Candidate plans of the planner of `companion`, `REPORTED_AFTER` control cycles after each new target, from a replay of
-/// the recording in `folder`. Prints how many commands are reproduced to the bit.
+/// Replays the recording in `folder`, and returns the planner's candidate plans `REPORTED_AFTER` control cycles after each
+/// new target. Prints how many commands equal the recorded ones bit by bit.
 pub fn sights(folder: &Path, companion: Companion, vehicle: Vehicle) -> Result<Vec<Sight>> {
     println!("replaying the recording, to show what the planner saw");
     let mut all = Vec::new();
@@ -128,12 +129,12 @@ pub fn sights(folder: &Path, companion: Companion, vehicle: Vehicle) -> Result<V
     Ok(all)
 }
 
-/// The recorded flight of `folder`.
+/// Reads the recorded flight in `folder`.
 pub fn read(folder: &Path) -> Result<Flight> {
     Ok(csv::load(&folder.join("flight.csv"), Tolerance::Strict)?.flight)
 }
 
-/// The part of the flight in which the target at roll and pitch (degrees) was in force, with its settled error.
+/// The part of the flight in which this target (roll and pitch, degrees) was commanded, with its settled error.
 pub fn segment(
     [roll_deg, pitch_deg]: [f64; 2],
     difficulty: Difficulty,
@@ -144,10 +145,10 @@ pub fn segment(
     scored(&samples, target, difficulty)
 }
 
-/// Shortest time for which a target must be in force to be scored, s.
+/// Shortest time for which a target must be commanded to be scored, s.
 const SHORTEST_S: f64 = 3.0;
 
-/// The parts of the flight in which a target was in force for at least 3 s, in time order.
+/// The parts of the flight in which a target was commanded for at least 3 s, in time order.
 pub fn segments(flight: &Flight) -> Vec<Segment> {
     let same = |a: &Sample, b: &Sample| wants(b, [a.roll_target_rad, a.pitch_target_rad]);
     let runs = flight.samples.chunk_by(same).filter(|run| {

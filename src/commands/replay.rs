@@ -1,4 +1,8 @@
-//! `greylag replay`: replays a recorded flight and compares the pilot's commands bit by bit.
+//! `greylag replay`: feeds the telemetry of a recorded flight to the companion again, and compares its commands with the
+//! recorded ones bit by bit.
+//!
+//! The companion is the part of this program that flies: a controller, and a pilot that limits the commands and falls back to a
+//! second controller.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -25,7 +29,7 @@ use crate::physics::airframe::ActuatorFigures;
 /// The arguments of `greylag replay`.
 #[derive(Args)]
 pub struct Arguments {
-    /// Folder that `greylag fly` or `demo` has recorded.
+    /// Folder with a flight recorded by `greylag fly` or `greylag demo`.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
     #[command(flatten)]
@@ -34,7 +38,7 @@ pub struct Arguments {
     json: JsonArgument,
 }
 
-/// Options that replace the recording's own entries on controller, model and link.
+/// Options that override what the recording states about controller, model and link.
 #[derive(Args, Debug)]
 pub struct FlownArguments {
     /// Controller that flew [default: as recorded, else hybrid-ilqr].
@@ -46,16 +50,16 @@ pub struct FlownArguments {
     /// Folder of the trained policy, for controllers that need one [default: as recorded].
     #[arg(long, value_name = "DIR")]
     policy: Option<PathBuf>,
-    /// Settings of the planner that differed from the defaults [default: as recorded].
+    /// Settings of the model-predictive planner that differed from its defaults [default: as recorded].
     #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
     changes: Vec<Change>,
-    /// Airframe file in place of the one that the model names [default: as recorded].
+    /// Airframe file that replaced the one named by the model file [default: as recorded].
     #[arg(long, value_name = "FILE")]
     airframe: Option<PathBuf>,
-    /// Schedule that was flown [default: as recorded].
+    /// Flight-test schedule that was flown [default: as recorded].
     #[arg(long, value_name = "FILE")]
     schedule: Option<PathBuf>,
-    /// Profile of the vehicle's link [default: as recorded, else sitl].
+    /// Kind of autopilot at the other end of the vehicle's link [default: as recorded, else sitl].
     #[arg(long, value_name = "NAME", value_enum)]
     profile: Option<ProfileName>,
     /// Quantity commanded to a real flight controller [default: as recorded, else surfaces].
@@ -63,13 +67,13 @@ pub struct FlownArguments {
     command: Option<CommandName>,
 }
 
-/// Model and controllers that flew a recording, ready to fly it again.
+/// Model, companion and link codec of a recorded flight, in the state before the flight.
 #[cfg_attr(
     not(feature = "demo"),
     expect(dead_code, reason = "pages are drawn with the simulator built in")
 )]
 pub struct Again {
-    /// Controller that flew.
+    /// Kind of controller that flew.
     pub controller: ControllerKind,
     /// Model of the aircraft.
     pub model: GreyBox,
@@ -77,15 +81,15 @@ pub struct Again {
     pub model_file: PathBuf,
     /// Pilot and controllers, as at the start of the flight.
     pub companion: Companion,
-    /// The other end of the vehicle's link.
+    /// Decoder of the vehicle's telemetry and encoder of the commands to it.
     pub vehicle: Vehicle,
 }
 
 impl FlownArguments {
-    /// Model and controller of the recording in `folder`. Options replace the entries of the recording.
+    /// Prepares a replay of the recording in `folder`. The options take precedence over the entries of the recording.
     ///
     /// # Errors
-    /// If the model, policy, schedule or options of the recording cannot be read or are invalid.
+    /// If the model, the policy, the schedule or the entries of the recording cannot be read or are invalid.
     pub fn again(&self, folder: &Path) -> Result<Again> {
         let said = FlownWith::read(folder)?;
         let said = said.as_ref();
@@ -110,7 +114,7 @@ impl FlownArguments {
             (None, None) => fly::CONTROLLER.parse()?,
         };
         let changes = match said {
-            // another controller may not have these settings
+            // the recorded settings may not exist in a controller that the user chose instead
             Some(said) if self.changes.is_empty() && self.controller.is_none() => said.changes()?,
             _ => self.changes.clone(),
         };
@@ -126,7 +130,7 @@ impl FlownArguments {
     }
 }
 
-/// The result as JSON.
+/// The result of the replay as it is written to a JSON file.
 #[derive(Serialize)]
 struct Document {
     ticks: u64,
@@ -137,7 +141,7 @@ struct Document {
     differences: Vec<Differing>,
 }
 
-/// A command that differs from the recorded one: aileron, elevator, throttle, rudder.
+/// A recorded command and the different command of the replay, each as aileron, elevator, throttle and rudder.
 #[derive(Serialize)]
 struct Differing {
     time_s: f64,
@@ -164,7 +168,7 @@ impl From<&Outcome> for Document {
     }
 }
 
-/// Replays the flight. The exit status is 0 if every command equals the recorded one.
+/// Replays the flight. The exit status is 0 if every command equals the recorded one and the telemetry is complete.
 ///
 /// # Errors
 /// If a file of the recording, the model or the policy cannot be read or is invalid.

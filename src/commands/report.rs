@@ -1,4 +1,4 @@
-//! `greylag report`: draws a recorded flight as a page.
+//! `greylag report`: draws a recorded flight as an HTML page.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -14,10 +14,10 @@ use crate::control::Pace;
 /// The arguments of `greylag report`.
 #[derive(Args)]
 pub struct Arguments {
-    /// Folder that `greylag fly` or `demo` has recorded.
+    /// Folder with the recording of `greylag fly` or `greylag demo`.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// The page [default: report.html in DIR].
+    /// HTML file to write [default: report.html in DIR].
     #[arg(long, value_name = "OUT.html")]
     out: Option<PathBuf>,
     /// Replace the page if it exists.
@@ -27,7 +27,7 @@ pub struct Arguments {
     flown: FlownArguments,
 }
 
-/// Draws attitude, commands, timing, the model's error, and the planner's candidates.
+/// Draws attitude, commands, loop timing, the model's prediction error and, for a controller that plans, its candidate plans.
 ///
 /// # Errors
 /// If a file of the recording, the model or the policy cannot be read, or the page cannot be written.

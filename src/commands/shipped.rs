@@ -1,4 +1,5 @@
-//! Finds the folder `params/` on the machine, or unpacks the copy inside the program.
+//! Finds the files of the folder `params/` (models and policies) on the machine. The program contains a copy of this folder
+//! and unpacks it if needed.
 
 use std::ffi::OsString;
 use std::io;
@@ -10,7 +11,7 @@ use crate::model::residual::hash;
 
 static PARAMS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/params");
 
-/// Name of the folder, in the source tree and below the folders that are searched.
+/// Name of the folder, in the source tree and in the folders that are searched.
 const FOLDER: &str = "params";
 
 /// Resolves a path. A path that exists is returned as given. A relative path below `params/` is searched in
@@ -62,13 +63,13 @@ fn unpacked(cache: &Path) -> io::Result<PathBuf> {
         std::fs::remove_dir_all(&folder)?;
     }
     match std::fs::rename(part.path(), &folder) {
-        // another process was faster
+        // another process has unpacked the copy in the meantime
         Err(_) if is_whole(&folder) => Ok(folder),
         done => done.map(|()| folder),
     }
 }
 
-/// Whether `folder` holds every file with the program's content.
+/// Whether `folder` holds every file of the program's copy with the same content.
 fn is_whole(folder: &Path) -> bool {
     let same = |file: &&File<'_>| {
         let path = folder.join(FOLDER).join(file.path());
@@ -77,7 +78,7 @@ fn is_whole(folder: &Path) -> bool {
     files(&PARAMS).iter().all(same)
 }
 
-/// SHA-256 over names and contents of the program's files, hexadecimal.
+/// SHA-256 over the names and contents of the files in the program's copy, hexadecimal.
 fn fingerprint() -> String {
     let one =
         |file: &File<'_>| [file.path().as_os_str().as_encoded_bytes(), file.contents()].concat();

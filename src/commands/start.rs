@@ -1,4 +1,4 @@
-//! Start of an episode in JSBSim, and notes about its aircraft.
+//! Initial state of an episode (one simulated flight) in JSBSim, and notes about the simulated aircraft.
 
 use anyhow::{Result, bail};
 use greylag_sitl::plant::{Plant, PlantOptions, Start};
@@ -7,10 +7,10 @@ use crate::model::GreyBox;
 use crate::physics::servos::Travels;
 use crate::sim::described::describe as describe_aircraft;
 
-/// The aircraft that starts under the conditions of the paper.
+/// The aircraft that starts at the paper's airspeed (T. Guerin et al., 2026).
 const X8: &str = "x8";
-/// Accepted relative difference between the travel in the airframe file and in the simulator. Numbers in files have
-/// four digits.
+/// Largest relative difference between the travel of a surface in the airframe file and in the simulator that is not reported.
+/// Numbers in files have four digits.
 const TRAVEL_TOLERANCE: f64 = 1e-3;
 
 /// Options for the initial state of an episode.
@@ -27,11 +27,11 @@ pub struct StartArguments {
 }
 
 impl StartArguments {
-    /// The start of `aircraft`, flown with controllers of `models`.
+    /// The initial state of `aircraft`. The controllers that fly it are designed from `models`.
     ///
     /// # Errors
-    /// If neither the option nor a model gives an airspeed, if a number is not finite, or if the airspeed is below the
-    /// smallest airspeed of a model.
+    /// If neither the option nor a model gives an airspeed, if the airspeed or the altitude is not finite, or if the airspeed
+    /// is below the smallest airspeed of a model.
     pub fn start(&self, aircraft: &str, models: &[GreyBox]) -> Result<Start> {
         let cruise = models.first().map(|m| m.airframe.envelope.airspeed_cruise_mps);
         let default = if aircraft == X8 { Some(Start::NEUTRAL.airspeed_mps) } else { cruise };
@@ -57,7 +57,7 @@ impl StartArguments {
     }
 }
 
-/// The default start of `aircraft`, flown with controllers of `models`.
+/// The default initial state of `aircraft`. The controllers that fly it are designed from `models`.
 ///
 /// # Errors
 /// The same as [`StartArguments::start`].
@@ -66,18 +66,18 @@ pub fn usual(aircraft: &str, models: &[GreyBox]) -> Result<Start> {
     StartArguments { start_airspeed_mps: None, start_altitude_m }.start(aircraft, models)
 }
 
-/// Applies the airframe of the first of `models` to the simulator's aircraft.
+/// Applies surfaces, motors and conditions of the airframe of the first of `models` to the simulator's aircraft.
 ///
 /// # Errors
-/// If the simulator cannot move the airframe's surfaces.
+/// If the airframe gives the JSBSim position property for some surfaces and not for others, or its mixer cannot be simulated.
 pub fn describe(plant: &mut PlantOptions, models: &[GreyBox]) -> Result<()> {
     let Some(model) = models.first() else { return Ok(()) };
     describe_aircraft(plant, &model.airframe)
         .map_err(|why| anyhow::anyhow!("the airframe of model {}: {why}", model.name))
 }
 
-/// Prints notes about the aircraft on standard error, and the differences between its travel and a
-/// model's airframe.
+/// Prints on standard error the simulator's notes about the aircraft, and the differences between its surface travel and the
+/// travel in the airframes of `models`.
 pub fn introduce(options: &PlantOptions, models: &[GreyBox]) -> Result<()> {
     let mut plant = Plant::new(options)?;
     plant.notes().iter().for_each(|note| eprintln!("note: {note}"));

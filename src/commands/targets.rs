@@ -1,4 +1,4 @@
-//! `greylag targets`: writes a target file.
+//! `greylag targets`: writes a target file, a random set of commanded attitudes (roll and pitch) for evaluations.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -11,7 +11,7 @@ use crate::sim::TargetFile;
 /// Options of `greylag targets`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Seed of the targets; 1 is the shipped file.
+    /// Seed of the random targets; 1 gives the targets of the shipped file.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// The file to write.

@@ -1,4 +1,4 @@
-//! Output on a terminal: tables of limited width, the answer in colour, the summary last.
+//! Output on a terminal: tables of limited width, coloured text, and the first and last lines of a command.
 
 use std::fmt::Arguments;
 use std::io::{self, IsTerminal, Write};
@@ -9,17 +9,17 @@ use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyl
 
 use crate::sysid::compare::Answer;
 
-/// Half width of a 95 % interval, in standard deviations. The symbol ± means this half width in every output.
+/// Half width of a 95 % interval, in standard deviations. The number after ± is this half width in every output.
 #[cfg(feature = "study")]
 pub const NORMAL_95: f64 = 1.96;
-/// Largest width of tables and texts, terminal columns.
+/// Largest width of tables and texts, characters.
 pub const WIDTH: u16 = 100;
 
-/// Length up to which a name in the first column is never broken into lines, characters.
+/// Names in the first column are kept on one line if the longest of them has at most this number of characters.
 #[cfg(feature = "study")]
 const NAME: usize = 40;
 
-/// Borders of a table: lines above the header, below it, and below the last row.
+/// Borders of a table: a line above the header, one below it, and one below the last row.
 const LINES: TableStyle = TableStyle::new()
     .top_border(LineStyle::none().fill('─').junction('─'))
     .header_separator(LineStyle::none().fill('─').junction('─'))
@@ -74,7 +74,8 @@ pub fn painted(text: &str, tone: Tone) -> String {
     }
 }
 
-/// `text` in lines of at most [`WIDTH`] characters, broken between words. A longer word has a line to itself.
+/// `text` in lines of at most [`WIDTH`] characters, broken between words. Continuation lines are indented by two spaces. A
+/// longer word has a line to itself.
 #[cfg(any(feature = "demo", test))]
 pub fn broken(text: &str) -> String {
     let mut lines = vec![String::new()];
@@ -92,8 +93,8 @@ pub fn broken(text: &str) -> String {
     lines.join("\n")
 }
 
-/// Prints a line to standard output. An output that the reader has closed is ignored: `println!` would panic there,
-/// and a panic of the main thread ends the flight.
+/// Prints a line to standard output. It does nothing if the reader has closed the output. `println!` would panic then, and
+/// a panic of the main thread ends the flight.
 pub fn say(line: Arguments<'_>) {
     let _ = writeln!(io::stdout(), "{line}");
 }
@@ -103,7 +104,8 @@ pub fn complain(line: Arguments<'_>) {
     let _ = writeln!(io::stderr(), "greylag: {line}");
 }
 
-/// Prints the answer box, before any other output of a command.
+/// Prints the short answer of a command in up to three lines, before its other output. The first line is green if the
+/// prediction error falls, and red if it rises.
 pub fn print_answer(answer: &Answer) {
     let tone = match answer.numbers.change_percent {
         p if p <= -0.05 => Tone::Good,

@@ -1,4 +1,4 @@
-//! Notifies systemd's watchdog while the control thread runs.
+//! Notifies systemd's watchdog as long as the control thread runs.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -8,9 +8,9 @@ use sd_notify::NotifyState;
 
 use crate::commands::terminal::complain;
 
-/// Notifies systemd's watchdog twice per watchdog period if `rounds` has changed since the last check. Does nothing if
-/// systemd has no watchdog for this process. If the control thread hangs, the notifications stop, and systemd restarts
-/// the process.
+/// Starts a thread that checks `rounds` twice per watchdog period and notifies systemd's watchdog if the value has changed.
+/// The control thread increments `rounds` in each of its cycles. If it hangs, the notifications stop, and systemd restarts
+/// the process. Without a watchdog for this process, the function does nothing.
 pub fn feed(rounds: Arc<AtomicU64>) {
     let Some(period) = sd_notify::watchdog_enabled() else { return };
     let started = std::thread::Builder::new().name("watchdog".into()).spawn(move || {

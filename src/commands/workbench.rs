@@ -1,4 +1,5 @@
-//! `greylag workbench`: analyses and amends a model with flight logs, in a browser.
+//! `greylag workbench`: a page in the browser on which a model is compared with flight logs and effects that it lacks are
+//! added to it.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -22,24 +23,25 @@ use crate::workbench::session::FILE;
     after_help = "The page is served on this machine only, to whoever has the token of the printed address. Everything is kept in the session's folder as it happens; Ctrl-C ends the workbench, and the same command goes on from there."
 )]
 pub struct Arguments {
-    /// Flight logs to begin with: CSV, PX4 ULog, ArduPilot .bin, MAVLink .tlog or ROS 2 bag (.mcap); more can be dropped on
-    /// the page.
+    /// Flight logs to begin with: CSV, PX4 ULog, ArduPilot .bin, MAVLink .tlog or ROS 2 bag (.mcap). More can be added on the
+    /// page.
     logs: Vec<PathBuf>,
     /// Model file [default: the model of the session; for a new session, the file named by the environment variable
     /// GREYLAG_MODEL].
     #[arg(long)]
     model: Option<PathBuf>,
-    /// Port on 127.0.0.1; 0 for any that is free.
+    /// TCP port on 127.0.0.1; with 0 the system chooses a free port.
     #[arg(long, default_value_t = 0)]
     port: u16,
-    /// Folder of the session; created if missing.
+    /// Folder of the session. It is created if it does not exist.
     #[arg(long = "dir", default_value = "greylag-session")]
     folder: PathBuf,
     #[command(flatten)]
     reading: Reading,
 }
 
-/// Path of the model from the option, or for a new session without the option from the environment variable.
+/// Path of the model: the value of `--model`; without this option, and for a new session only, the value of the environment
+/// variable `GREYLAG_MODEL`.
 fn model(arguments: &Arguments) -> Option<PathBuf> {
     let new = !arguments.folder.join(FILE).exists();
     let environment = || std::env::var_os("GREYLAG_MODEL").filter(|_| new).map(PathBuf::from);
@@ -59,7 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let token = random_token().context("cannot draw a token for the page")?;
     serve(given, arguments.port, &token, |address| {
         let session = arguments.folder.display();
-        // The reader of standard output may have closed it. The page is served regardless.
+        // if standard output is closed, the page is served all the same
         let _ = write!(
             std::io::stdout(),
             "the workbench is open at {address}\nsession: {session}; Ctrl-C ends it\n"

@@ -1,5 +1,5 @@
-//! Pre-flight check of a model: trim over the envelope, modes, control authority and stability margins of the LQI
-//! loops.
+//! Pre-flight check of a model: trim over the envelope, modes, control authority, and stability margins of the LQI
+//! (linear-quadratic controller with integral action). A finding is a sentence on something to correct before a flight.
 
 use serde::Serialize;
 
@@ -11,17 +11,16 @@ use greylag_model::{GreyBox, Trim, TrimError};
 
 /// Number of airspeeds in the trim table.
 const SPEEDS: usize = 7;
-/// Largest fraction of the elevator's travel that trim may use without a finding. The remaining fifth is kept for manoeuvres
-/// and gusts.
+/// Largest fraction of the elevator's travel that trim may use without a finding. The rest is kept for manoeuvres and gusts.
 const MUCH_TRAVEL: f64 = 0.8;
 /// Total delay of sensing, link and servo that is typical of a small aircraft, s.
 const USUAL_DELAY: f64 = 0.04;
 /// Accuracy of the search for the fastest level flight, m/s.
 const LEVEL_WITHIN_MPS: f64 = 0.01;
-/// Smallest steady roll rate at full aileron without a finding, rad/s (20°/s).
+/// Smallest steady roll rate at full aileron without a finding, rad/s (about 20°/s).
 const SLOW_ROLL: f64 = 0.35;
 
-/// Steady straight flight at one airspeed. Where level flight is not possible, it is a descent at full throttle or at idle.
+/// Steady straight flight at one airspeed. If level flight is not possible, it is a descent at full throttle or at idle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Level {
     /// True airspeed V_a, m/s.
@@ -36,30 +35,30 @@ pub struct Level {
     pub path: f64,
 }
 
-/// The recommended controller and its delay margin.
+/// The recommended controller, the LQI or the damped LQI (with other weights), and its delay margin.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Advised {
     /// Name of the controller in the registry.
     pub name: &'static str,
-    /// Smallest delay margin of its loops, s.
+    /// Smallest delay margin of the controller's loops at the cruise airspeed, s.
     pub delay_s: f64,
 }
 
 /// Results of [`check`] at the model's reference altitude.
 #[derive(Clone, Debug, Serialize)]
 pub struct AircraftCheck {
-    /// Trimmed straight flight over the envelope's airspeeds, where a trim exists.
+    /// Straight flight at equally spaced airspeeds of the envelope. Airspeeds without a trim are left out.
     pub levels: Vec<Level>,
     /// The modes at the cruise airspeed.
     pub modes: Vec<Mode>,
     /// Airspeed of the fastest level flight, m/s. `None` if level flight is possible at the envelope's highest airspeed, or
     /// not even at cruise.
     pub level_up_to: Option<f64>,
-    /// The recommended controller.
+    /// The recommended controller and its margin.
     pub controller: Advised,
     /// Control authority at the cruise airspeed.
     pub authority: Authority,
-    /// Stability margins of each LQI loop at the cruise airspeed.
+    /// Stability margins of each loop of the LQI with default weights at the cruise airspeed.
     pub loops: Vec<LoopMargins>,
     /// Findings to correct before a flight, most severe first.
     pub findings: Vec<String>,
@@ -101,8 +100,8 @@ pub fn check(model: &GreyBox) -> Result<AircraftCheck, CheckError> {
     Ok(check)
 }
 
-/// Recommends the LQI or, for a larger delay margin, the damped LQI. The damped LQI is recommended only if the LQI's margin is
-/// below `USUAL_DELAY` and the damped LQI's is larger.
+/// Recommends the LQI if its delay margin is at least [`USUAL_DELAY`]. Otherwise recommends the one of LQI and damped LQI
+/// that has the larger delay margin.
 fn advised(model: &GreyBox) -> Result<Advised, CheckError> {
     let cruise = model.airframe.envelope.airspeed_cruise_mps;
     let least = |weights: &Weights| -> Result<f64, MarginsError> {
@@ -123,8 +122,8 @@ fn flies_level(model: &GreyBox, airspeed: f64) -> bool {
     trim.is_ok_and(|t| (0.0..=1.0).contains(&t.controls.throttle))
 }
 
-/// Returns the airspeed (m/s) of the fastest level flight between the cruise airspeed and the envelope's highest airspeed.
-/// `None` if level flight is possible at the highest airspeed, or not even at cruise.
+/// Returns the highest airspeed (m/s) of level flight, between the cruise airspeed and the envelope's highest airspeed.
+/// `None` if level flight is possible at the envelope's highest airspeed, or not even at cruise.
 pub fn fastest_level(model: &GreyBox) -> Option<f64> {
     let envelope = model.airframe.envelope;
     let (mut slow, mut fast) = (envelope.airspeed_cruise_mps, envelope.airspeed_max_mps);
@@ -156,7 +155,7 @@ fn findings_in_level(model: &GreyBox, level: &Level) -> Vec<String> {
             100.0 * elevator.abs()
         ));
     }
-    // above the cruise airspeed, a descent at full throttle is not reported
+    // above the cruise airspeed, a descent at full throttle is no fault
     let cruises = airspeed <= model.airframe.envelope.airspeed_cruise_mps;
     if cruises && throttle == 1.0 && path < 0.0 {
         out.push(format!(

@@ -1,10 +1,11 @@
-//! Stability and control derivatives of roll and pitch, estimated in flight from body rates, flow angles and deflections.
+//! Estimates stability and control derivatives of roll and pitch in flight, from body rates, flow angles and deflections.
 //!
 //! The method is equation error in the time domain (E. A. Morelli, V. Klein, "Aircraft System Identification", 2nd ed., 2016,
-//! chapter 5) by recursive least squares with a prior. In the regression, ω̇ is a sum of terms, each a coefficient times a
-//! measured quantity. Both sides are differentiated and pass the same low-pass filters. The differentiation removes constant
-//! and slow influences (trim, wind). The delay between measured and effective deflections is unknown. Regressions with several
-//! delays therefore run in parallel, and the estimates are taken from the one with the smallest mean square error.
+//! chapter 5) by recursive least squares with a prior. The regression equates the angular acceleration of an axis with a sum
+//! of terms. Each term is a coefficient times a measured quantity. Both sides are differentiated and pass the same low-pass
+//! filters. The differentiation removes constant and slow influences (trim, wind). The delay between measured and effective
+//! deflections is unknown. Regressions with several delays therefore run in parallel, and the estimates are taken from the
+//! regression with the smallest mean square error.
 //!
 //! The estimator needs no model, and no command depends on it. Its estimates are for display and for the flight's summary.
 
@@ -20,40 +21,40 @@ pub const DERIVATIVES: [&str; 4] = ["L_da", "L_p", "M_de", "M_a"];
 const CONTROLS: usize = 2;
 const MOTION: usize = 5;
 const TERMS: usize = CONTROLS + MOTION;
-/// Prior means and standard deviations of the coefficients of roll and pitch, made dimensionless with V/g at the cruise
-/// airspeed V. Those of control power, damping and stiffness are medians and spreads of drawn aircraft (`greylag aircraft
-/// draw`). The coefficients are in the order of [`of_controls`], followed by that of [`of_motion`].
+/// Prior means and standard deviations of the coefficients of roll and of pitch, made dimensionless with V/g at the cruise
+/// airspeed V. The values for control power, damping and stiffness are medians and spreads over aircraft drawn at random
+/// (`greylag aircraft draw`). The coefficients belong to the terms of [`of_controls`], followed by those of [`of_motion`].
 const PRIORS: [[[f64; TERMS]; 2]; 2] = [
     [[200.0, 0.0, 15.0, 0.0, 0.0, 0.0, 0.0], [250.0, 30.0, 10.0, 300.0, 20.0, 1.0, 1.0]],
     [[150.0, 0.0, 10.0, 40.0, 0.0, 0.0, 0.0], [200.0, 30.0, 7.0, 50.0, 30.0, 1.0, 1.0]],
 ];
 /// Corner frequency of the low-pass filters on both sides of the regression, rad/s.
 const CORNER: f64 = 10.0;
-/// Standard deviation of the regression's error, 1/s². Its product with V/g (s) has the unit of the regression's left side.
+/// Standard deviation of the regression's error, divided by V/g at the cruise airspeed, 1/s².
 const NOISE: f64 = 4.0;
-/// Delays of the controls for which regressions run, in samples. The longest is last.
+/// Delays of the controls in the parallel regressions, samples. The longest delay is last.
 const DELAYS: [usize; 4] = [0, 2, 4, 6];
 const LONGEST: usize = DELAYS[DELAYS.len() - 1];
 /// Time constant of the running mean square error by which the delays are compared, s.
 const FORGETTING_S: f64 = 20.0;
-/// Growth rate of each variance by forgetting, as a fraction of the prior variance, 1/s.
+/// Rate at which forgetting enlarges each variance that is below its prior variance, as a fraction of the latter, 1/s.
 const AGEING: f64 = 1e-4;
 /// Accepted sample intervals, s.
 const STEPS_S: std::ops::RangeInclusive<f64> = 0.002..=0.05;
-/// An estimate counts as known if its standard deviation is less than this fraction of its prior's.
+/// An estimate counts as known if its standard deviation is less than this fraction of its prior standard deviation.
 const KNOWN: f64 = 0.3;
 /// Range of the ratio of airspeed to cruise airspeed in which the estimates are updated.
 const SPEEDS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
-/// Estimator of the derivatives of one aircraft. [`AircraftEstimator::see`] is called with each state of a flight, in the order
-/// of time.
+/// Estimator of the derivatives of one aircraft. [`AircraftEstimator::see`] must be called with each state of a flight, in the
+/// order of time.
 #[derive(Clone, Debug)]
 pub struct AircraftEstimator {
     /// Cruise airspeed, m/s.
     cruise: f64,
-    /// Full travel of aileron, elevator and rudder, rad. The rudder's is infinite for an aircraft without a rudder.
+    /// Travel of aileron, elevator and rudder to the side with the smaller travel, rad. Infinite for a missing rudder.
     travel: [f64; 3],
-    /// Roll and pitch.
+    /// The regressions of roll and of pitch.
     axes: [Axis; 2],
     /// Controls of the last samples, newest first: aileron, elevator and rudder divided by their travels, then the throttle.
     /// `None` before the first sample and after an interruption.
@@ -82,7 +83,7 @@ struct Regression {
     prior_sd: [f64; TERMS],
     theta: [f64; TERMS],
     covariance: [[f64; TERMS]; TERMS],
-    /// Low-passed square of the error before each update.
+    /// Low-pass filtered square of the prediction error before each update.
     error: f64,
 }
 
@@ -98,8 +99,8 @@ impl Filter {
         Filter { low, slope: 0.0 }
     }
 
-    /// Filters a further sample `x`, `step` seconds after the previous one. Returns the filtered derivative before and after this
-    /// sample.
+    /// Filters a sample `x`, which is `step` seconds after the previous one. Returns the filtered derivative before and after
+    /// this sample.
     fn take(&mut self, x: f64, step: f64) -> [f64; 2] {
         let before = self.slope;
         self.low += step * CORNER * (x - self.low);
@@ -118,8 +119,8 @@ impl Axis {
     }
 
     /// Updates the regressions with the body rate (rad/s), the terms of the motion, and the terms of the controls for each delay.
-    /// `time` is V/g at the cruise airspeed, s. `step` is the time since the last sample, s. Values that are not finite restart
-    /// the filters.
+    /// `time` is V/g at the cruise airspeed, s. `step` is the time since the last sample, s. If a value is not finite, the
+    /// filters restart.
     fn see(
         &mut self,
         rate: f64,
@@ -167,8 +168,8 @@ impl Regression {
         Regression { prior_sd: sd, theta: mean, covariance, error: 0.0 }
     }
 
-    /// One step of recursive least squares for `y` = θ·`x`, whose error has the standard deviation `noise`. `step` is the time
-    /// since the last sample, s.
+    /// One step of recursive least squares for the equation `y` = θ·`x`. Its error has the standard deviation `noise`. `step` is
+    /// the time since the last sample, s.
     fn learn(&mut self, x: &[f64; TERMS], y: f64, noise: f64, step: f64) {
         let dot = |a: &[f64; TERMS]| a.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
         let spread: [f64; TERMS] = std::array::from_fn(|k| dot(&self.covariance[k]));
@@ -187,7 +188,8 @@ impl Regression {
         }
     }
 
-    /// Coefficient `k`. NaN if its standard deviation exceeds the fraction [`KNOWN`] of its prior's.
+    /// Estimate of coefficient `k`. NaN if its standard deviation is not below the fraction [`KNOWN`] of the prior standard
+    /// deviation.
     fn known(&self, k: usize) -> f64 {
         let narrowed = self.covariance[k][k].sqrt() / self.prior_sd[k];
         if narrowed < KNOWN { self.theta[k] } else { f64::NAN }
@@ -204,9 +206,9 @@ fn of_controls(
     [[aileron * pressure, rudder * pressure], [-elevator * pressure, throttle]]
 }
 
-/// Regression terms that depend on the motion. Those of roll are the damping, β, the yaw rate and two gyroscopic moments. Those
-/// of pitch are the damping, α, the trim moment and two gyroscopic moments. `speed` is the airspeed divided by the cruise
-/// airspeed, and `time` is V/g at the cruise airspeed, s.
+/// Regression terms that depend on the motion. The terms of roll are those of damping, β, yaw rate and two products of body
+/// rates (inertial coupling). The terms of pitch are those of damping, α, a constant moment coefficient and inertial coupling.
+/// `speed` is the airspeed divided by the cruise airspeed, and `time` is V/g at the cruise airspeed, s.
 fn of_motion(s: &State, speed: f64, time: f64) -> [[f64; MOTION]; 2] {
     let (pressure, rate, square) = (speed * speed, speed * time, time * time);
     [
@@ -222,7 +224,7 @@ fn of_motion(s: &State, speed: f64, time: f64) -> [[f64; MOTION]; 2] {
 }
 
 impl AircraftEstimator {
-    /// An estimator for the aircraft with `airframe`, from which only the cruise airspeed and the travels are used.
+    /// An estimator for the aircraft with `airframe`. It uses only the cruise airspeed and the travels of the surfaces.
     pub fn new(airframe: &Airframe) -> AircraftEstimator {
         let surfaces = &airframe.actuators;
         let rudder = surfaces.rudder.as_ref().map_or(f64::INFINITY, |s| s.travel.smallest());
@@ -275,8 +277,8 @@ impl AircraftEstimator {
     }
 
     /// The dimensional derivatives at the cruise airspeed, in the order of [`DERIVATIVES`]: L_δa and M_δe in rad/s² at full
-    /// deflection (L_δa is positive, M_δe negative), L_p in 1/s, M_α in 1/s². A value that the flight does not determine is NaN:
-    /// its standard deviation exceeds 0.3 of its prior's.
+    /// deflection (L_δa is positive, M_δe negative), L_p in 1/s, M_α in 1/s². A value is NaN if the flight does not determine it:
+    /// its standard deviation is not below 0.3 of its prior standard deviation.
     pub fn derivatives(&self) -> [f64; DERIVATIVES.len()] {
         let time = self.cruise / STANDARD_GRAVITY;
         let [roll, pitch] = self.axes.each_ref().map(Axis::best);
@@ -291,7 +293,8 @@ impl AircraftEstimator {
 mod tests {
     use super::*;
 
-    /// The simulated axis has a control power of 120, a damping of 12, a constant trim moment and a control delay of 40 ms.
+    /// The simulated axis has a dimensionless control power of 120 and damping of 12, a constant moment, and a control delay of
+    /// 40 ms.
     #[test]
     fn control_power_and_damping_are_found_beside_a_delay() {
         let (time, step, truth) = (2.0, 0.01, [120.0, 12.0]);

@@ -1,4 +1,5 @@
-//! Estimate of the disturbance: the state rate that the model does not explain, constant over a plan.
+//! Estimates the disturbance: the part of the state's rate of change that the model does not explain. A planner adds the
+//! estimate to its model and keeps it constant over a plan.
 //!
 //! The method is offset-free model predictive control (Pannocchia and Rawlings, AIChE J. 49, 2003) with the disturbance on
 //! the states. If the aircraft flies steadily, the planner's model with the disturbance is steady too, whatever the model error.
@@ -12,11 +13,12 @@ use greylag_physics::actuators::Actuators;
 pub(crate) const NONE: State =
     State { roll: 0.0, pitch: 0.0, airspeed: 0.0, p: 0.0, q: 0.0, r: 0.0, alpha: 0.0, beta: 0.0 };
 
-/// Default time constant of the estimate, s. An estimate with a shorter one follows the noise. An estimate with a longer one
-/// lags behind manoeuvres.
+/// Default time constant of the estimate, s. With a shorter time constant the estimate follows the noise. With a longer one
+/// it lags behind manoeuvres.
 pub(crate) const TIME_CONSTANT_S: f64 = 0.3;
-/// Default of the largest relative prediction error at which planning uses the model. In still air `params/x8/learned`
-/// stays below it and `prior-as-printed` almost always exceeds it (`results/notes/2026-11-27-learned-models.md`).
+/// Default limit of the prediction error relative to the measured motion. Above it, planning does not use the model. In still
+/// air the error of `params/x8/learned` stays below the limit, and that of `prior-as-printed` almost always exceeds it
+/// (`results/notes/2026-11-27-learned-models.md`).
 pub(crate) const TRUST: f64 = 0.5;
 /// Averaging time of the squared prediction errors and measured changes, s: a few periods of the short-period mode.
 const MEMORY_S: f64 = 0.5;
@@ -26,11 +28,11 @@ const SLOPE_MEMORY_S: f64 = 2.0;
 /// the model is rejected. The slope is near 0 in gusts, and −1 if the predicted change did not happen at all.
 /// `docs/validation/controllers.md` has values in turbulence for right and wrong models.
 const SLOPE: f64 = 0.7;
-/// Size of the changes in calm flight, in x_c (eq. 21) per second. The error is compared with the motion plus this size. Calm
-/// flight therefore does not show a model error.
+/// Motion that is added to the measured motion before the prediction error is related to it, in x_c per second. x_c is the
+/// characteristic scale of a state (eq. 21 of \[GSFM26\]). Small errors in calm flight therefore do not count as large.
 const CALM: f64 = 0.02;
 
-/// Recursive estimate of the disturbance and of the model's prediction error.
+/// Recursive estimator of the disturbance and of the model's prediction error.
 #[derive(Clone, Debug)]
 pub(crate) struct Disturbance {
     /// Time constant of the estimate, s.
@@ -38,10 +40,11 @@ pub(crate) struct Disturbance {
     last: Option<Observation>,
     memory: Memory,
     rate: State,
-    /// Mean squares over [`MEMORY_S`] of the prediction error and of the measured change, (x_c per second)².
+    /// Mean squares over [`MEMORY_S`] of the prediction error and of the measured state change, (x_c per second)².
     missed: f64,
     happened: f64,
-    /// Means over [`SLOPE_MEMORY_S`] of error times prediction and of the squared prediction, for the rates p, q, r.
+    /// Means over [`SLOPE_MEMORY_S`] of the prediction error times the predicted change, and of the squared predicted change.
+    /// Both are sums over p, q and r.
     slope: [f64; 2],
 }
 
@@ -53,8 +56,8 @@ impl Disturbance {
         Disturbance { time_constant, last: None, memory, rate: NONE, missed, happened, slope }
     }
 
-    /// Compares `seen` with the model's prediction from the last tick. After a gap between ticks there is no comparison.
-    /// Values that are not finite do not change the estimate.
+    /// Updates the estimates with the difference between `seen` and the model's prediction from the last tick. After a gap
+    /// between ticks, and with values that are not finite, the estimates do not change.
     pub fn update(&mut self, model: &GreyBox, seen: &Observation) {
         let follows = |last: &Observation| {
             let gap = seen.time.since(last.time).as_secs_f64();
@@ -86,7 +89,7 @@ impl Disturbance {
 
     /// Updates the error statistics with one step's prediction error `missed` and measured change `happened`.
     fn compare(&mut self, model: &GreyBox, missed: &State, happened: &State) {
-        // only body rates and flow angles are compared, in x_c per second: attitude and airspeed are their integrals
+        // only body rates and flow angles are compared, in x_c per second: attitude and airspeed follow from them by integration
         let scale = model.scale();
         let scaled = |change: &State| -> [f64; 5] {
             let change = change.to_array();
@@ -94,8 +97,7 @@ impl Disturbance {
         };
         let (missed, happened) = (scaled(missed), scaled(happened));
         let square = |x: &[f64]| -> f64 { x.iter().map(|x| x * x).sum() };
-        // the slope excludes flow angles: a gust changes them immediately, but the body rates only through the moments that
-        // follow
+        // the slope excludes flow angles: a gust changes them immediately, but it changes the body rates only through moments
         let predicted: [f64; 3] = std::array::from_fn(|i| happened[i] - missed[i]);
         let product: f64 = missed.iter().zip(predicted).map(|(m, p)| m * p).sum();
         let means = [square(&missed), square(&happened), product, square(&predicted)];
@@ -111,15 +113,15 @@ impl Disturbance {
     }
 
     /// Whether planning must not use the model. The result is true if two conditions hold: the root-mean-square prediction error
-    /// of the last half second exceeds the fraction `most` of the motion, and the error is correlated with the prediction. The
-    /// second condition excludes gusts, which no model predicts.
+    /// of the last half second exceeds the fraction `most` of the measured motion, and the error is correlated with the predicted
+    /// change. The second condition excludes gusts, which no model predicts.
     pub fn is_wrong(&self, most: f64) -> bool {
         let part = (self.missed / (self.happened + CALM * CALM)).sqrt();
         let [product, predicted] = self.slope;
         part > most && (product / (predicted + CALM * CALM)).abs() > SLOPE
     }
 
-    /// Estimated disturbance: the addition to the model's state rate, in units of the state per second.
+    /// Estimated disturbance, which is added to the model's state rate, in units of the state per second.
     pub fn rate(&self) -> State {
         self.rate
     }
@@ -173,8 +175,8 @@ mod tests {
         assert_eq!(disturbance.rate(), found);
     }
 
-    /// The estimate of `model`'s errors after 10 s of simulated flight with the model `truth`. Aileron and elevator move. At each
-    /// step random gusts change the body rates by up to `gust` (rad/s).
+    /// The estimator for `model` after a simulated flight of 10 s with the model `truth`. Aileron and elevator alternate between
+    /// ±0.1 rad. At each step random gusts change the body rates by up to `gust` (rad/s).
     fn predicted(model: &str, truth: &str, gust: f64) -> Disturbance {
         let load = |name: &str| {
             let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8").join(name);

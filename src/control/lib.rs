@@ -1,4 +1,4 @@
-//! Controllers: they map an observation and a target to a command every 10 ms.
+//! Controllers: they map an observation and a target to a command every 10 ms. A tick is one such control cycle.
 
 pub mod adaptive;
 pub mod aircraft_check;
@@ -24,7 +24,7 @@ use insight::Insight;
 
 use greylag_physics::{ActuatorState, Command, State, Time};
 
-/// Input of a controller: eq. (27) of \[GSFM26\], and the altitude, which sets the air density.
+/// Input of a controller: eq. (27) of \[GSFM26\] (T. Guerin et al., 2026), and the altitude, which sets the air density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
     /// Time of the measurement on the vehicle's clock.
@@ -70,14 +70,14 @@ pub struct Overruled {
 
 /// A control law, called every 10 ms of vehicle time.
 ///
-/// Order of calls: [`Controller::reset`] before the first tick of an engagement, then [`Controller::command`] once
-/// per tick. [`Controller::prepare`] is optional between two ticks. If the last command was limited,
-/// [`Controller::overruled`] precedes the next command. [`Controller::insight`] describes the last command. Errors occur
-/// only on construction ([`build`]). A tick without a command returns NaN.
+/// Order of calls: [`Controller::reset`] before the first tick after the controller takes over, then [`Controller::command`]
+/// once per tick. [`Controller::prepare`] is optional between two ticks. If the last command was limited,
+/// [`Controller::overruled`] precedes the next command. [`Controller::insight`] describes the last command. Errors occur only
+/// on construction ([`build`]).
 pub trait Controller: Send + Sync {
     /// The name that selects the controller on the command line.
     fn name(&self) -> &'static str;
-    /// Clears the internal state (integrators, warm starts) before take-off or on re-engagement.
+    /// Clears the internal state (integrators, warm starts) before take-off or when the controller takes over again.
     ///
     /// The first command after a reset may differ from the present deflections. The caller limits the slew rate of the
     /// surfaces.
@@ -87,17 +87,17 @@ pub trait Controller: Send + Sync {
     /// A controller without a command, such as a planner without a plan, returns NaN. The caller must check
     /// [`Command::is_finite`] and fly another controller, as the pilot does with its fallback controller.
     fn command(&mut self, seen: &Observation, target: &Target) -> Command;
-    /// Informs the controller, before its next command, that its last command was limited. Its integrators must not wind
-    /// up at a limit.
+    /// Informs the controller, before its next command, that its last command was limited. The controller then prevents its
+    /// integrators from winding up.
     fn overruled(&mut self, _by: &Overruled) {}
-    /// Computes part of the next tick in advance, in the time between two commands. The call does not change the
-    /// commands.
+    /// Computes part of the next tick in advance, in the time between two commands. The commands are the same without this
+    /// call.
     fn prepare(&mut self) {}
-    /// The candidates from which the last command was chosen, for the observation `seen`. `None` for a controller that does
-    /// not plan.
+    /// The candidate plans from which the last command was chosen, for the observation `seen`. `None` for a controller that
+    /// does not plan.
     fn insight(&self, _seen: &Observation) -> Option<Insight> {
         None
     }
-    /// A copy of this controller for another thread. The copy does not repeat the design.
+    /// A copy of this controller for another thread. The copy is not designed anew.
     fn boxed_clone(&self) -> Box<dyn Controller>;
 }

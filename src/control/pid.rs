@@ -12,7 +12,7 @@ pub struct Gains {
     pub kp: f64,
     /// Integral gain on the error, output per unit of the error and second.
     pub ki: f64,
-    /// Gain on the measured body rate, output per rad/s. The law subtracts this term. Zero in the airspeed loop.
+    /// Gain on the measured body rate p or q, output per rad/s. The law subtracts this term. Zero in the airspeed loop.
     pub kd: f64,
 }
 
@@ -40,14 +40,14 @@ pub struct Tuning {
 /// Integrator behaviour under saturation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Windup {
-    /// The integrator continues to integrate, as in the public controller.
+    /// The integrator continues to integrate, as in the controller of FW-JSBGym ([`PUBLIC`]).
     Free,
     /// Conditional integration: the integrator stops when it would drive the output further into saturation.
     Clamped,
 }
 
 /// Gains published with the simulator FW-JSBGym, the baseline of comparisons. They are from the version of its `pid_eval` that
-/// was the latest in 2026. An earlier version had 1.0, 0, 0.5 for roll and −4, −0.75, −0.1 for pitch.
+/// was the latest in 2026. In an earlier version kp, ki and kd were 1.0, 0 and 0.5 for roll, −4, −0.75 and −0.1 for pitch.
 pub const PUBLIC: Tuning = Tuning {
     name: "pid",
     roll: Gains { kp: 1.5, ki: 0.1, kd: 0.1 },
@@ -59,8 +59,8 @@ pub const PUBLIC: Tuning = Tuning {
     windup: Windup::Free,
 };
 
-/// Gains tuned in the simulator by random search over the shipped targets (240 trials). The controller holds an airspeed
-/// with a margin before the stall.
+/// Gains tuned in the simulator by random search over the shipped targets (240 trials). The controller holds 22 m/s, at a
+/// distance from the stall.
 #[expect(clippy::approx_constant, reason = "the simulator's stop is at 0.5235 rad, not at 30°")]
 pub const RETUNED: Tuning = Tuning {
     name: "pid-retuned",
@@ -88,7 +88,7 @@ impl Pid {
         Pid { tuning, integrals: [0.0; 3], added: [0.0; 3] }
     }
 
-    /// Output of one loop, limited to `stops` (minimum, maximum).
+    /// Output of one loop, limited to `stops` (minimum, maximum). Updates the loop's integrator.
     fn step(
         &mut self,
         axis: usize,

@@ -1,4 +1,8 @@
-//! The registry of controllers: their names, needs and construction.
+//! The registry of controllers: their names, what they need, and their construction.
+//!
+//! A planner is a controller that searches for a sequence of commands in simulations of the model, by CEM (cross-entropy
+//! method), MPPI (model predictive path integral) or iLQR (iterative linear quadratic regulator). A policy is a trained
+//! network. The LQI is a linear quadratic controller with integral action.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,7 +14,7 @@ use greylag_model::GreyBox;
 /// Reason why a controller cannot be built.
 #[derive(Debug, thiserror::Error)]
 pub enum SetupError {
-    /// The name is not in the registry.
+    /// The registry has no controller of this name.
     #[error("there is no controller {name:?}; there are {}", ControllerKind::names())]
     Unknown {
         /// The name that was requested.
@@ -24,12 +28,12 @@ pub enum SetupError {
     Design {
         /// Name of the model.
         model: String,
-        /// Roll of the failing design, degrees.
+        /// Roll angle at which the design failed, degrees.
         roll_deg: f64,
-        /// Pitch of the failing design, degrees.
+        /// Pitch angle at which the design failed, degrees.
         pitch_deg: f64,
     },
-    /// The model has an effect that has not been accepted.
+    /// The model has an effect that was proposed by a search and that the user has not accepted.
     #[error(
         "cannot fly model {model}: its effect {effect} was proposed by a search; look at it, then write status = \
          \"accepted\" into the effect's file"
@@ -51,7 +55,7 @@ pub enum SetupError {
         /// Description of the error.
         why: String,
     },
-    /// The planner needs critics, but the policy has none.
+    /// The planner needs critics (networks that estimate the value of a state), but the policy has none.
     #[error(
         "controller {name} values the end of its plans with critics, and this policy has none; fly it as \
          `policy` or `cem-policy`, or export it with its critics"
@@ -65,11 +69,11 @@ pub enum SetupError {
 /// Inputs from which a controller is built.
 #[derive(Clone, Copy, Debug)]
 pub struct Source<'a> {
-    /// The model used by a design or planner.
+    /// The model from which the LQI is designed and with which planners simulate. Its airframe is used by all controllers.
     pub model: &'a GreyBox,
     /// The networks of a trained policy. `None` if there is no policy.
     pub agent: Option<&'a Agent>,
-    /// Overrides of the planner's default settings.
+    /// Changes of a planner's default settings.
     pub changes: &'a [cem::Change],
 }
 
@@ -84,12 +88,13 @@ impl<'a> Source<'a> {
         self.agent.ok_or(SetupError::Untrained)
     }
 
-    /// A planner with `settings` and the overrides, without a base controller.
+    /// A planner with `settings` and the user's changes, without a base controller.
     fn planner(&self, name: &'static str, settings: cem::Settings) -> Result<cem::Cem, SetupError> {
         self.planner_over(None, name, settings)
     }
 
-    /// A planner with the model's LQI as base controller. Without a policy, the search starts only from the LQI's plan.
+    /// A planner with the model's LQI as base controller, which flies on after the end of each plan. Without a policy, no
+    /// policy's plans are among the candidates.
     fn planner_over_lqi(
         &self,
         name: &'static str,
@@ -121,9 +126,9 @@ impl<'a> Source<'a> {
 /// The thread on which a controller must run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// In the control loop. The controller needs microseconds per command.
+    /// The thread of the control loop, for a controller that needs microseconds per command.
     Immediate,
-    /// On its own thread. The controller plans and may miss the deadline.
+    /// An own thread, for a controller that plans and may miss the deadline of a tick.
     Planned,
 }
 
@@ -138,7 +143,7 @@ pub enum Needs {
     Policy,
     /// A model and a policy.
     Both,
-    /// A model and optionally a policy, whose plans are then among the candidates.
+    /// A model and optionally a policy. The policy's plans are then among the candidates.
     ModelAndAnyPolicy,
 }
 
@@ -179,8 +184,8 @@ macro_rules! controllers {
         ///
         /// # Errors
         ///
-        /// If the model does not allow the design or has an effect that was not accepted, if a required policy or its critics are
-        /// missing, or if the shipped policy cannot be read.
+        /// If no LQI can be designed from the model, the model has an effect that was not accepted, a required policy or its
+        /// critics are missing, or the shipped policy for all aircraft cannot be read.
         pub fn build<'a>(
             kind: ControllerKind,
             source: impl Into<Source<'a>>,
@@ -214,7 +219,7 @@ controllers! {
 }
 
 impl ControllerKind {
-    /// Whether the controller searches with [`cem::Settings`]. If true, a [`cem::Change`] has an effect.
+    /// Whether the controller searches with [`cem::Settings`], so that a [`cem::Change`] has an effect on it.
     pub fn searches(self) -> bool {
         self.pace() == Pace::Planned
             && !matches!(self, ControllerKind::Ilqr | ControllerKind::HybridIlqr)

@@ -3,7 +3,7 @@
 use greylag_model::{GreyBox, Trim, TrimError};
 use greylag_physics::{Controls, State};
 
-/// Step size as a fraction of the surface's travel.
+/// Step size as a fraction of the surface's smaller travel.
 pub const STEPPED: f64 = 0.25;
 /// Simulated time after the step, s.
 const FLOWN_S: f64 = 3.0;
@@ -19,8 +19,8 @@ pub struct StickResponse {
     pub states: Vec<State>,
 }
 
-/// The response to a quarter of full aileron (roll right), then that to a quarter of full elevator (nose up). The responses
-/// start from straight flight at the cruise airspeed. The servos are ideal.
+/// Computes the response to a quarter of full aileron (roll right), then that to a quarter of full elevator (nose up). Both
+/// start from straight flight at the cruise airspeed. The surfaces move without delay.
 ///
 /// # Errors
 ///

@@ -35,18 +35,18 @@ impl Task {
         discount: 0.99,
     };
 
-    /// The smallest reward of a step, with every term at its cap.
+    /// The smallest possible reward of a step, which has every term at its cap.
     pub fn worst(&self) -> f64 {
         -(self.roll_cap + self.pitch_cap + self.airspeed_cap)
     }
 
     /// The reward of the step in which the aircraft is lost: the discounted sum of the smallest reward over infinitely many
-    /// steps. Without it, an early end of an episode would avoid the cost of the remaining steps.
+    /// steps. With a smaller penalty, the loss of the aircraft could cost less than flying on.
     pub fn of_loss(&self) -> f64 {
         self.worst() / (1.0 - self.discount)
     }
 
-    /// The reward of `state` for `target`. It is at most 0.
+    /// The reward for the state `state` when `target` is commanded. It is 0 on target and negative elsewhere.
     #[inline(always)]
     pub fn reward<R: Real>(&self, state: &State<R>, target: &Target<R>) -> R {
         #[inline(always)]

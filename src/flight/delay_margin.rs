@@ -1,4 +1,5 @@
-//! Delay margin of a controller's surface loops, found by simulation: the smallest delay with a limit cycle.
+//! Delay margin of a controller, found by simulation: the smallest delay of the elevator or aileron command at which the
+//! closed loop keeps oscillating.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -11,26 +12,26 @@ use greylag_physics::{Command, Time};
 
 /// Step between the simulated delays, ms.
 const STEP_MS: usize = 4;
-/// Largest simulated delay, ms. A loop that is stable with this delay has enough margin.
+/// Largest simulated delay, ms. A loop that is stable with this delay needs no more margin.
 const LONGEST_MS: usize = 120;
 /// Length of a simulation in ticks of 10 ms.
 const TICKS: usize = 1000;
-/// Ticks with a pulse of full deflection, which begins after 1 s and lasts 0.1 s.
+/// Ticks in which a disturbance acts: a pulse of full deflection that begins after 1 s and lasts 0.1 s.
 const PULSE: std::ops::Range<usize> = 100..110;
 /// First evaluated tick. The last 2 s of a simulation are evaluated, as `examples/delay_margin.rs` does with JSBSim.
 const END: usize = 800;
-/// Peak-to-peak rate at the end of a simulation above which the loop oscillates, rad/s (10 °/s).
+/// Peak-to-peak roll or pitch rate in the evaluated ticks above which the loop counts as oscillating, rad/s (10 °/s).
 const SWING: f64 = 0.17;
 /// Control period in ms.
 const TICK_MS: usize = 10;
 
-/// The smallest delay at which `controller` makes the pitch or the roll loop of `model` oscillate. The simulation
-/// starts in level flight at the cruise airspeed and applies a pulse of full deflection. `None` if the loops are stable
-/// up to 0.12 s.
+/// The smallest delay at which `model` with `controller` keeps oscillating in pitch or in roll. One of the two surface
+/// commands is delayed at a time. Each simulation starts in straight flight at the cruise airspeed and applies a pulse of
+/// full deflection. `None` if the loops are stable at all delays up to 0.12 s.
 ///
-/// The controller receives surface positions that are computed from the undelayed commands. A real flight controller
-/// does not report positions either. The search takes about a second for a controller that computes its command in
-/// microseconds.
+/// The controller receives surface positions that are computed from the undelayed commands, because a real flight
+/// controller does not report positions. The search takes about a second for a controller that computes its command
+/// in microseconds.
 ///
 /// # Errors
 /// If the model has no trim at the cruise airspeed. The delay margin is then unknown.
@@ -38,7 +39,7 @@ pub fn delay_margin(
     controller: &dyn Controller,
     model: &GreyBox,
 ) -> Result<Option<Duration>, TrimError> {
-    // RK4, because Euler steps as in JSBSim delay the attitude by one cycle, unlike an aircraft
+    // RK4 is used because Euler steps, as in JSBSim, add a delay of one cycle that an aircraft does not have
     let model = &{
         let mut continuous = model.clone();
         continuous.integrator = Integrator::Rk4;
@@ -60,7 +61,8 @@ enum Axis {
     Roll,
 }
 
-/// Whether the rate about `axis` still oscillates at the end of a simulation from `trim` with the delay `delay_ms`.
+/// Whether the rate about `axis` still oscillates at the end of a simulation from `trim`, if the surface command of `axis`
+/// is delayed by `delay_ms`.
 fn swings(
     controller: &dyn Controller,
     model: &GreyBox,
@@ -130,8 +132,8 @@ fn surface(command: &mut Command, axis: Axis) -> &mut f64 {
     }
 }
 
-/// The command at the actuators: `now`, but with the surface of `axis` delayed by `delay_ms`. `late` holds the latest
-/// commands, the newest last. A delay by a fraction of a cycle interpolates linearly between two of them.
+/// The command at the actuators: `now`, but with the surface command of `axis` delayed by `delay_ms`. `late` holds the latest
+/// commands, the newest last. For a delay that is not a multiple of the control period, two of them are interpolated.
 fn delayed(late: &VecDeque<Command>, now: Command, axis: Axis, delay_ms: usize) -> Command {
     let (whole, share) = (delay_ms / TICK_MS, (delay_ms % TICK_MS) as f64 / TICK_MS as f64);
     let newest = late.len() - 1;
@@ -179,8 +181,8 @@ mod tests {
 
     #[test]
     fn the_model_says_of_delay_what_the_official_simulator_does() {
-        // In JSBSim with steps of 1 ms, the loop oscillates after a pulse of full deflection from a delay of 46 ms on
-        // with `lqi` (in pitch), and from 104 ms on with `lqi-damped` (`examples/delay_margin.rs`).
+        // In JSBSim with steps of 1 ms, the smallest delay with an oscillation after a pulse of full deflection is 46 ms
+        // with `lqi` (in pitch) and 104 ms with `lqi-damped` (`examples/delay_margin.rs`).
         let model = x8();
         let margin = |kind| {
             let margin = delay_margin(build(kind, &model).unwrap().as_ref(), &model).unwrap();

@@ -1,7 +1,8 @@
-//! The companion as a function of received bytes and time, without threads, sockets or a wall clock.
+//! The companion (Greylag's autopilot) as a function of received bytes and time, without threads, sockets or a wall clock.
 //!
 //! It runs the same pilot, vehicle link and controller as [`runtime`](super::runtime). Fault campaigns use it to fly
-//! thousands of flights in one process.
+//! thousands of flights in one process. Host time is the time of the companion's computer. Vehicle time is the time in the
+//! vehicle's state frames.
 
 use std::time::Duration;
 
@@ -56,7 +57,7 @@ impl Desk {
     }
 
     /// Processes `bytes` that arrive at the host time `host`, and appends the replies to `out`. Calls `watch` with each
-    /// state and its decision.
+    /// state that is not late and with the pilot's decision for it.
     pub fn receive(
         &mut self,
         host: Duration,
@@ -126,8 +127,7 @@ impl Desk {
         self.anchor.map_or(Time::default(), |(at, time)| time.plus(host.saturating_sub(at)))
     }
 
-    /// Arms the companion, as a client's request does. An obstacle to the engagement of the vehicle is returned as a
-    /// rejection.
+    /// Arms the companion, as a client's request does. If the vehicle cannot be engaged, rejects the request with the reason.
     pub fn arm(&mut self, host: Duration) -> Verdict {
         match self.vehicle.obstacle() {
             Some(obstacle) => Verdict::Rejected(obstacle),

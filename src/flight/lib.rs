@@ -1,4 +1,7 @@
-//! The companion in flight: pilot, runtime, recorder, replay and model monitor, and a desk for tests.
+//! The companion, which is Greylag's autopilot on board.
+//!
+//! The pilot decides, the runtime connects it to threads and sockets, the recorder writes flights and replay repeats them. The
+//! monitor compares measurements with the model. The desk runs the companion without threads and sockets, for tests.
 
 mod delay_margin;
 pub mod desk;

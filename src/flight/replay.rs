@@ -1,4 +1,5 @@
-//! Replay of a recorded flight: the same calls and frames give the same commands.
+//! Replay of a recorded flight. A new pilot and controller receive the recorded calls and telemetry frames. Their commands
+//! are compared with the recorded ones bit by bit. The pilot decides on the command of each control cycle (tick).
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -14,7 +15,7 @@ use greylag_link::peer::{LinkId, PeerId, SERIAL};
 use greylag_link::vehicle::{Order, Telemetry, Vehicle};
 use greylag_physics::{Command, Time};
 
-/// Largest number of differences that are kept.
+/// Largest number of differences that the outcome lists.
 const SHOWN: usize = 10;
 
 /// A recorded flight cannot be replayed.
@@ -49,7 +50,7 @@ pub enum ReplayError {
 /// A tick whose replayed command differs from the recorded one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
-    /// Vehicle time of the state.
+    /// Time of the state by the vehicle's clock.
     pub time: Time,
     /// The command in the recording.
     pub recorded: Command,
@@ -62,15 +63,15 @@ pub struct Difference {
 pub struct Outcome {
     /// Number of ticks replayed.
     pub ticks: u64,
-    /// Number of commands that differ in any bit.
+    /// Number of ticks whose command differs from the recorded one in any bit.
     pub different: u64,
-    /// Number of plans of the controller that differ in any bit from the recorded plans.
+    /// Number of ticks at which the command computed by the controller differs from the recorded one in any bit.
     pub plans_different: u64,
-    /// Number of ticks whose state is missing in the telemetry. The commands after such a tick cannot be compared.
+    /// Number of ticks whose state is missing in the telemetry. Later commands may differ for this reason.
     pub without_state: u64,
     /// The first differences, at most ten, in order.
     pub differences: Vec<Difference>,
-    /// Whether the recording ends inside an entry, for instance after a crash.
+    /// Whether the end of the recording is missing, for instance after a crash.
     pub cut_short: bool,
 }
 
@@ -83,8 +84,8 @@ struct States {
 }
 
 impl States {
-    /// The state of vehicle time `time` with its arrival time; `None` if the telemetry has no such state. Earlier
-    /// states are skipped, because the recording has no call for them.
+    /// The state with the vehicle's time stamp `time`, and its arrival time; `None` if the telemetry has no such state.
+    /// Earlier states are skipped, because the recording has no call for them.
     fn next(&mut self, time: Time) -> Option<(Duration, Telemetry)> {
         loop {
             while let Some((host, state)) = self.ready.pop_front() {
@@ -105,8 +106,8 @@ impl States {
         Some(u64::from_be_bytes(*self.bytes.get(self.at..)?.first_chunk()?))
     }
 
-    /// Reads the frames of one packet, which share a timestamp. As in flight, all frames are processed before any state
-    /// is answered.
+    /// Reads the frames of one packet, which share a timestamp. As in flight, all frames are processed before a command
+    /// is computed from a state.
     fn read_packet(&mut self) -> Option<()> {
         let (stamp, mut read) = (self.stamp()?, None);
         while self.stamp() == Some(stamp) && self.read_one(stamp).is_some() {
@@ -147,11 +148,11 @@ pub fn replay(
     replay_watched(folder, companion, vehicle, &mut |_, _, _| ())
 }
 
-/// Callback for each planned tick of a replay. Its arguments are the vehicle time, the request, and the controller
-/// after it has computed its command.
+/// Callback for each tick of a replay at which the controller computes a command. Its arguments are the vehicle time, the
+/// request to the controller, and the controller after the computation.
 pub type Watch<'a> = dyn FnMut(Time, &Request, &dyn Controller) + 'a;
 
-/// Replays like [`replay`], and calls `watch` for each planned tick.
+/// Replays like [`replay`], and calls `watch` for each tick at which the controller computes a command.
 ///
 /// # Errors
 ///
@@ -200,12 +201,13 @@ struct Replayed<'w, 'f> {
     companion: Companion,
     states: States,
     outcome: Outcome,
-    /// Whether the controller is still to be reset, because the planner was busy at the last engagement.
+    /// Whether the next request must reset the controller. The planner was busy when the companion last took control.
     owed: bool,
 }
 
 impl Replayed<'_, '_> {
-    /// Makes one call. Returns `false` when the telemetry has ended. Verdicts are not compared.
+    /// Repeats one recorded call of the pilot. Returns `false` when the telemetry has ended. The pilot's replies to
+    /// requests are not compared.
     fn make(&mut self, call: &Call) -> bool {
         let pilot = &mut self.companion.pilot;
         match *call {
@@ -255,7 +257,7 @@ impl Replayed<'_, '_> {
             Planned::None => Plan::None,
         };
         let decision = self.companion.pilot.decide(plan);
-        // The link to a flight controller estimates the actuator positions from the commands that were sent.
+        // The link to a real flight controller estimates the actuator positions from the sent commands.
         self.states.vehicle.answer(host, state.time, &decision.demand());
         self.outcome.ticks += 1;
         if !same(&decision.command, &recorded) {

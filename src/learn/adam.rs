@@ -2,9 +2,9 @@
 
 /// State of Adam (Kingma and Ba, 2015, algorithm 1) for a list of parameters.
 ///
-/// burn's Adam requires the parameters in burn's tensors. The training of the dynamics keeps them in plain arrays and
-/// updates them 500 times a second. Copying them to tensors would take more code than the algorithm. A test compares
-/// the algorithm with a case calculated by hand.
+/// The Adam of the machine-learning library burn requires the parameters in burn's tensors. The training of dynamics models
+/// keeps them in plain arrays and updates them 500 times a second. Copying them to tensors would take more code than the
+/// algorithm. A test compares the algorithm with a case calculated by hand.
 ///
 /// The state is public because a checkpoint stores it. A resumed training must equal an uninterrupted one to the bit.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,7 +13,7 @@ pub struct Adam {
     pub mean: Vec<f64>,
     /// Running means of the squared gradients.
     pub square: Vec<f64>,
-    /// Number of steps made.
+    /// Number of updates begun so far.
     pub steps: u64,
 }
 
@@ -21,18 +21,18 @@ const BETA: [f64; 2] = [0.9, 0.999];
 const EPSILON: f64 = 1e-8;
 
 impl Adam {
-    /// State for `count` parameters before the first step.
+    /// The initial state for `count` parameters.
     pub fn new(count: usize) -> Adam {
         Adam { mean: vec![0.0; count], square: vec![0.0; count], steps: 0 }
     }
 
-    /// Starts a step.
+    /// Starts an update of all parameters.
     pub fn begin(&mut self) {
         self.steps += 1;
     }
 
-    /// The change of parameter `place` for its `gradient` at the learning rate `rate`. The function must be called once
-    /// for each parameter between two calls of [`begin`](Adam::begin).
+    /// Returns the change of parameter number `place` for its `gradient` at the learning rate `rate`. The function must be
+    /// called once for each parameter between two calls of [`begin`](Adam::begin).
     pub fn move_of(&mut self, place: usize, gradient: f64, rate: f64) -> f64 {
         let (m, v) = (&mut self.mean[place], &mut self.square[place]);
         *m = BETA[0] * *m + (1.0 - BETA[0]) * gradient;

@@ -1,4 +1,6 @@
-//! Checkpoints of a model training, in a file that is replaced atomically.
+//! Checkpoints of the training of a grey-box model, in a file that is replaced atomically.
+//!
+//! The model has physical effects with coefficients (the prior) and a network (the residual).
 
 use std::collections::HashMap;
 use std::io::Write;
@@ -12,15 +14,15 @@ use crate::adam::Adam;
 /// State of a model training.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
-    /// Hash of recipe, prior and data.
+    /// Hash of the training's settings, prior and data.
     pub identity: String,
     /// Parameters of the network.
     pub network: Vec<f32>,
-    /// Coordinates of the trained coefficients of the prior.
+    /// Coordinates of the trained coefficients of the prior: a linear transformation of their changes (`dynamics::basis`).
     pub coordinates: Vec<f64>,
     /// State of the optimiser.
     pub adam: Adam,
-    /// λ of eq. (24) of \[GSFM26\]: the penalty on the residual is divided by it.
+    /// λ of eq. (24) of \[GSFM26\] (T. Guerin et al., 2026): the penalty on the residual is divided by it.
     pub lambda: f64,
     /// Number of updates made.
     pub update: u64,
@@ -54,7 +56,7 @@ pub enum CheckpointError {
     Other,
 }
 
-/// The scalars of a checkpoint. They are the only entry of the file's metadata.
+/// The scalars of a checkpoint. The file stores them as one metadata entry.
 #[derive(Serialize, Deserialize)]
 struct Header {
     schema: String,
@@ -69,8 +71,8 @@ const SCHEMA: &str = "greylag.checkpoint/1";
 const METADATA: &str = "greylag";
 
 impl Checkpoint {
-    /// Checks that the checkpoint belongs to the training `identity`. The training has `parameters` parameters, of
-    /// which `coordinates` are coordinates of the prior.
+    /// Checks that the checkpoint belongs to the training `identity` with `parameters` parameters, of which `coordinates` are
+    /// coordinates of the prior.
     ///
     /// # Errors
     ///
@@ -104,7 +106,7 @@ impl Checkpoint {
         })
     }
 
-    /// Reads a checkpoint.
+    /// Reads a checkpoint from the file `path`.
     ///
     /// # Errors
     ///
@@ -193,7 +195,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     };
     let mut builder = tempfile::Builder::new();
     builder.prefix(".greylag-").suffix(".part");
-    // A temporary file is private by default. A model file must have the permissions that the umask allows.
+    // A temporary file is readable only by its owner by default. A model file must have the permissions that the umask allows.
     #[cfg(unix)]
     let everyone: std::fs::Permissions = std::os::unix::fs::PermissionsExt::from_mode(0o666);
     #[cfg(unix)]

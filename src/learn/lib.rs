@@ -1,5 +1,6 @@
-//! Learning of grey-box models from flights, prior and residual together (section IV-A of \[GSFM26\]), and of policies
-//! in a model or in JSBSim (section IV-B).
+//! Learning of grey-box models from flights, and of policies in simulation. A grey-box model is a physical prior plus a neural
+//! residual; both are learned together (section IV-A of the paper \[GSFM26\], see `src/lib.rs`). A policy is a neural network
+//! that commands the aircraft; it is learned in simulations of a model or of JSBSim (section IV-B).
 
 mod adam;
 mod checkpoint;

@@ -1,4 +1,4 @@
-//! Link addresses on the command line, such as `udpin:0.0.0.0:14550`.
+//! Addresses of MAVLink links on the command line, such as `udpin:0.0.0.0:14550`.
 
 use std::fmt;
 use std::net::{SocketAddr, ToSocketAddrs};
@@ -77,7 +77,10 @@ impl HostPort {
         Ok(HostPort { host: host.into(), port })
     }
 
-    /// The first address that the host name resolves to; an error if it does not resolve.
+    /// The first address to which the host name resolves.
+    ///
+    /// # Errors
+    /// If the host name cannot be resolved.
     pub fn resolve(&self) -> Result<SocketAddr, AddressError> {
         let failed = |reason: String| AddressError::Lookup { host: self.host.clone(), reason };
         (self.host.as_str(), self.port)
@@ -89,8 +92,8 @@ impl HostPort {
 }
 
 impl Address {
-    /// Whether the link is reachable only from this machine: a loopback address or a serial port. A name that cannot be
-    /// resolved counts as reachable from other machines.
+    /// Whether the link is reachable only from this machine: its address is a loopback address or a serial port. A name that
+    /// cannot be resolved counts as reachable from other machines.
     pub fn stays_here(&self) -> bool {
         match self {
             Address::UdpIn(at) | Address::UdpOut(at) | Address::TcpIn(at) | Address::TcpOut(at) => {

@@ -1,4 +1,5 @@
-//! The interface of an autopilot to its MAVLink clients, which separates the protocol from the pilot.
+//! The interface through which MAVLink clients use the autopilot. The protocol code knows only this interface and not the pilot,
+//! which is the flight logic of the companion.
 
 use greylag_physics::{ActuatorState, Command, Time};
 
@@ -9,7 +10,7 @@ pub enum Mode {
     Manual,
     /// Wings level at the cruise airspeed. PX4 AUTO/LOITER, main 4 sub 3.
     Hold,
-    /// Return to launch, which is recognised but always refused. PX4 AUTO/RTL, main 4 sub 5.
+    /// Return to launch. Requests of this mode are always refused. PX4 AUTO/RTL, main 4 sub 5.
     Return,
     /// Attitude setpoints from a client. PX4 main mode 6.
     Offboard,
@@ -17,7 +18,7 @@ pub enum Mode {
     Stabilized,
 }
 
-/// Result of a request.
+/// Result of a client's request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// The request was carried out (MAV_RESULT_ACCEPTED).
@@ -61,14 +62,14 @@ pub enum Severity {
     Warning = 4,
     /// An unusual event (MAV_SEVERITY_NOTICE).
     Notice = 5,
-    /// Normal operation (MAV_SEVERITY_INFO).
+    /// An event of normal operation (MAV_SEVERITY_INFO).
     Info = 6,
 }
 
-/// A STATUSTEXT line for the ground stations.
+/// A text for the ground stations, sent as STATUSTEXT.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Text {
-    /// Severity of the line.
+    /// Severity of the text.
     pub severity: Severity,
     /// The text. Up to 400 characters are sent, in chunks of 50 characters. A longer text is cut and ends with `...`.
     pub words: String,
@@ -77,13 +78,13 @@ pub struct Text {
 /// A parameter's value in its MAVLink type.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ParameterValue {
-    /// A float (MAV_PARAM_TYPE_REAL32).
+    /// A 32-bit float (MAV_PARAM_TYPE_REAL32).
     Real(f32),
     /// An integer (MAV_PARAM_TYPE_INT32). Its bytes are sent in the float field.
     Int(i32),
 }
 
-/// One entry of the parameter table. Its position in the table is its index.
+/// One entry of the parameter table. Its index is its position in the table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
     /// Name of the parameter, at most 16 ASCII characters.
@@ -123,36 +124,38 @@ pub struct Status {
     pub actuators: ActuatorState,
     /// Recent processing time of the control task as a fraction of its 10 ms cycle, 0..1.
     pub load: f64,
-    /// Model residuals (measured minus predicted) in the order of [`RESIDUALS`]. Each is divided by the half width of
-    /// its band, two standard deviations (see `flight::monitor`), and is dimensionless. Beyond −1..1 a residual is
-    /// outside its band.
+    /// Residuals of the model monitor (measured minus predicted acceleration) in the order of [`RESIDUALS`]. Each is divided by
+    /// two standard deviations of the prediction, the half width of its band, and is dimensionless. A magnitude above 1 is
+    /// outside the band.
     pub residuals: [f64; 6],
     /// Dimensional derivatives of the aircraft at its cruise airspeed, estimated in flight, in the order of
     /// [`ESTIMATES`]: rad/s² at full deflection for L_δa and M_δe, 1/s for L_p, 1/s² for M_α.
     pub derivatives: [f64; ESTIMATES.len()],
 }
 
-/// Names of the residuals: specific forces along body x, y, z, then angular accelerations about x, y, z.
+/// Names of the residuals: specific forces along body x, y and z, then angular accelerations about these axes.
 pub const RESIDUALS: [&str; 6] = ["res_fx", "res_fy", "res_fz", "res_roll", "res_pitch", "res_yaw"];
 
 /// Names of the estimated derivatives L_δa, L_p, M_δe and M_α.
 pub const ESTIMATES: [&str; 4] = ["est_L_da", "est_L_p", "est_M_de", "est_M_a"];
 
-/// An autopilot as its clients see it. `flight::pilot::Pilot` and a test double in the protocol tests implement it.
+/// An autopilot as its clients see it. It is implemented by `flight::pilot::Pilot` and by a test double in the protocol tests.
+/// `now` is the vehicle time.
 pub trait Autopilot {
     /// Enables the actuator outputs. `force` skips the pre-arm checks.
     fn arm(&mut self, now: Time, force: bool) -> Verdict;
-    /// Disables the actuator outputs. `force` also allows it in flight.
+    /// Disables the actuator outputs. In flight this requires `force`.
     fn disarm(&mut self, now: Time, force: bool) -> Verdict;
     /// Requests a flight mode.
     fn set_mode(&mut self, now: Time, mode: Mode) -> Verdict;
-    /// Passes a valid attitude setpoint, which also restarts the offboard timeout.
+    /// Passes a valid attitude setpoint and restarts the timeout for missing setpoints.
     fn attitude_setpoint(&mut self, now: Time, setpoint: AttitudeSetpoint);
-    /// Passes stick positions, which also restart the timeout of the sticks.
+    /// Passes stick positions and restarts the timeout for missing stick positions.
     fn sticks(&mut self, now: Time, sticks: Sticks);
     /// The parameter table. Its length and order never change.
     fn parameters(&self) -> &[Parameter];
-    /// Sets the parameter `index`. `value` already has the table's type. A refusal contains the reason.
+    /// Sets the parameter with index `index`. `value` must have the type of the parameter's present value. A refusal contains
+    /// the reason.
     fn set_parameter(&mut self, index: usize, value: ParameterValue) -> Verdict;
     /// The present state, for telemetry streams.
     fn status(&self) -> Status;

@@ -1,6 +1,7 @@
-//! MAVLink server of an autopilot for ground stations and offboard programs.
+//! MAVLink server through which ground stations and offboard programs (clients) use an autopilot.
 //!
-//! The server has no sockets and no clock. See [`Clients`] for the order of calls.
+//! The server has no sockets and no clock: its caller passes received bytes and the time. See [`Clients`] for the order of
+//! calls.
 
 mod commands;
 mod counts;
@@ -32,9 +33,9 @@ use setpoints::OTHER_SETPOINT;
 
 /// Largest number of simultaneous sessions.
 pub const MAX_SESSIONS: usize = 32;
-/// Silence after which a new peer may replace a session while all sessions are in use.
+/// While all sessions are in use, a new peer may replace a session whose peer has been silent for this time.
 const DISPLACEABLE: Duration = Duration::from_secs(3);
-/// Time without frames after which the session of a datagram peer ends.
+/// Time without frames after which the session of a peer without a connection (UDP) ends.
 const FORGOTTEN: Duration = Duration::from_secs(60);
 /// Largest number of texts fetched from the autopilot per call of `poll`.
 const TEXTS_PER_POLL: usize = 8;
@@ -45,8 +46,8 @@ const CUT: &str = "...";
 
 /// Host time and vehicle time at a call.
 ///
-/// Host time paces heartbeats and streams, which continue when the vehicle stops. Vehicle time is passed to the
-/// autopilot and stamps the messages.
+/// Heartbeats and streams are paced by host time, so that they continue if the vehicle's clock stops. Vehicle time is passed to
+/// the autopilot and written into the messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Now {
     /// Time since the program's start, monotonic.
@@ -61,15 +62,14 @@ pub struct Now {
 ///
 /// - input: [`Clients::handle`] takes received bytes, [`Clients::welcome`] and [`Clients::forget`] take connections
 ///   that open and close;
-/// - time: [`Clients::poll`] queues the messages that are due;
+/// - time: [`Clients::poll`] queues the frames that are due;
 /// - output: [`Clients::drain`] returns the queued frames;
 /// - queries: [`Clients::peers`], [`Clients::counts`], [`Clients::session_count`], [`Clients::identity`].
 ///
 /// Order of calls: after any input, and after `poll` about every 10 ms, call `drain` and send its frames. The queue of
 /// frames is bounded; further frames are dropped and counted. `handle` and `poll` call the [`Autopilot`] synchronously.
 ///
-/// [`Now::host`] must not decrease between calls. [`Now::vehicle`] is passed to the autopilot and written into the
-/// messages; it may stop, and may restart with the vehicle.
+/// [`Now::host`] must not decrease between calls. [`Now::vehicle`] may stop, and may restart with the vehicle.
 ///
 /// Work and memory per call are bounded for any input.
 #[derive(Debug)]
@@ -91,7 +91,8 @@ pub struct Clients {
 }
 
 impl Clients {
-    /// A server without sessions. `identity` is the sender of its messages (system 1, component 1 with the shim).
+    /// A server without sessions. `identity` is the sender of its messages. In flights with the simulator it is system 1,
+    /// component 1.
     pub fn new(identity: Source) -> Self {
         Clients {
             identity,
@@ -111,19 +112,19 @@ impl Clients {
         }
     }
 
-    /// A server for the onboard computer of a flight controller whose system id is not known yet. It serves only
-    /// requests to this component, and streams only on request.
+    /// A server for an onboard computer beside a flight controller whose system id is not known yet. The server answers only
+    /// requests that are addressed to its component, and sends streams only on request.
     pub fn onboard() -> Self {
         let identity = Source { system: 1, component: ONBOARD };
         Clients { role: Role::Onboard, ..Clients::new(identity) }
     }
 
-    /// Adopts the flight controller's system id for the messages of this server.
+    /// Sets the system id of the server's messages to `system`, the flight controller's.
     pub fn adopt(&mut self, system: u8) {
         self.identity.system = system;
     }
 
-    /// System and component id of the messages sent.
+    /// System and component id of the server's messages.
     pub fn identity(&self) -> Source {
         self.identity
     }
@@ -133,7 +134,7 @@ impl Clients {
         self.sessions.iter().map(|session| session.peer)
     }
 
-    /// Opens a session before the peer has sent anything, for the target of a `udpout:` link or a TCP connection. The
+    /// Opens a session before the peer has sent anything: for the target of a `udpout:` link, or for a TCP connection. The
     /// session lasts until [`Clients::forget`].
     pub fn welcome(&mut self, now: Now, peer: PeerId) {
         match self.sessions.iter().position(|s| s.peer == peer) {
@@ -151,7 +152,7 @@ impl Clients {
         self.stick_authority.release(peer);
     }
 
-    /// Handles one datagram, or complete frames of a stream, from `peer`.
+    /// Handles `bytes` from `peer`: one datagram, or complete frames of a byte stream.
     pub fn handle(&mut self, now: Now, peer: PeerId, bytes: &[u8], autopilot: &mut dyn Autopilot) {
         let mut counts = FrameCounts::default();
         for frame in Frames::new(bytes, &mut counts) {
@@ -160,8 +161,8 @@ impl Clients {
         self.counts.frames.add(counts);
     }
 
-    /// Queues the messages that are due: heartbeats, streams, parameters and texts. The control task calls it about
-    /// every 10 ms.
+    /// Ends the sessions of silent peers, and queues the frames that are due: heartbeats, streams, parameters and texts. To be
+    /// called about every 10 ms.
     pub fn poll(&mut self, now: Now, autopilot: &mut dyn Autopilot) {
         self.sessions.retain(|s| {
             s.stay == Stay::UntilForgotten || now.host.saturating_sub(s.heard) < FORGOTTEN
@@ -177,12 +178,12 @@ impl Clients {
         self.summarise(now);
     }
 
-    /// Removes the queued frames, oldest first, each with its peer.
+    /// Removes and returns the queued frames, oldest first, each with its peer.
     pub fn drain(&mut self) -> impl Iterator<Item = (PeerId, Vec<u8>)> + '_ {
         self.outbox.drain()
     }
 
-    /// Counters of received traffic.
+    /// Counters of received frames and of dropped messages.
     pub fn counts(&self) -> ClientCounts {
         ClientCounts { dropped: self.outbox.dropped(), ..self.counts }
     }
@@ -210,8 +211,8 @@ impl Clients {
         }
     }
 
-    /// Opens a session and returns its index. If all sessions are in use, it replaces the session with the longest
-    /// silence; `None` if no session may be replaced.
+    /// Opens a session for `peer` and returns its index. If all sessions are in use, the new session replaces the one whose peer
+    /// has been silent longest; `None` if no session may be replaced.
     fn admit(&mut self, now: Now, peer: PeerId, stay: Stay) -> Option<usize> {
         if self.sessions.len() >= MAX_SESSIONS {
             let silent = |s: &Session| now.host.saturating_sub(s.heard);
@@ -226,7 +227,7 @@ impl Clients {
         }
         let mut session = Session::new(peer, stay, now.host);
         if self.role == Role::Onboard {
-            // Turns off group 0, which contains all default streams.
+            // group 0 contains all streams that are on by default; they are turned off
             session.streams.set_group(0, None, now.host);
         }
         self.sessions.push(session);
@@ -261,7 +262,7 @@ impl Clients {
                 self.set_parameter(now, at, from, name, value, autopilot)
             }
             Request::Mission { step, kind } => self.reply(at, &mission(step, kind, from)),
-            // a reply must not be answered: opcode 128 is ACK, 129 is NAK
+            // opcodes 128 (ACK) and 129 (NAK) are replies and are not answered
             Request::File { opcode: 128 | 129, .. } => {}
             Request::File { sequence, session, opcode } => {
                 self.reply(at, &answer::file_nak(sequence, session, opcode, from));
@@ -278,7 +279,8 @@ impl Clients {
         }
     }
 
-    /// Handles SET_MODE, which has no acknowledgement. The heartbeat shows the new mode. A refusal is sent as text.
+    /// Handles SET_MODE, which has no acknowledgement in MAVLink. The client sees the new mode in the heartbeat. A refusal is
+    /// sent as a text.
     fn set_mode(
         &mut self,
         now: Now,
@@ -302,7 +304,7 @@ impl Clients {
         self.sessions[at].send(message, self.identity, &mut self.outbox);
     }
 
-    /// Queues a text for one client.
+    /// Queues a text for the client of the session with index `at`.
     fn say(&mut self, at: usize, severity: Severity, words: &str) {
         self.text_id = self.text_id.checked_add(1).unwrap_or(1);
         let cut = (words.chars().count() > TEXT_LENGTH)
@@ -311,7 +313,7 @@ impl Clients {
         self.sessions[at].say(severity, words, self.text_id, self.identity, &mut self.outbox);
     }
 
-    /// Queues a warning for one client, unless its rate limit is exceeded.
+    /// Queues a warning for the client of the session with index `at`, unless it has had too many recently.
     fn complain(&mut self, now: Now, at: usize, words: &str) {
         if self.sessions[at].may_complain(now.host) {
             self.say(at, Severity::Warning, words);

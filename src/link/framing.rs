@@ -24,11 +24,12 @@ const SIGNATURE: usize = 13;
 const FLAG_SIGNED: u8 = 0x01;
 /// Length of the longest frame, bytes: MAVLink 2 with full payload and signature.
 pub const MAX_FRAME: usize = HEADER_V2 + 255 + CHECKSUM + SIGNATURE;
-/// Number of false starts in one datagram or chunk after which the rest is dropped. A false start is a start marker
-/// without a valid frame. Each costs a CRC over up to 267 bytes. The limit bounds the time for noise to a few
+/// Largest number of false starts in one datagram or chunk. At the next one the rest is dropped. A false start is a start
+/// marker without a valid frame. Each costs a CRC over up to 267 bytes. The limit bounds the time for noise to a few
 /// microseconds.
 const MAX_FALSE_STARTS: u32 = 32;
-/// Largest number of frames from one datagram or chunk. A datagram of one MTU holds fewer.
+/// Largest number of frames from one datagram or chunk. MAVLink 2 frames have at least 12 bytes, so a datagram of 1500 bytes
+/// holds fewer.
 const MAX_FRAMES: u32 = 128;
 
 /// MAVLink protocol version of a frame.
@@ -58,7 +59,7 @@ pub struct Frame<'a> {
     pub sequence: u8,
     /// Sender of the frame.
     pub source: Source,
-    /// Message id.
+    /// Id of the message type.
     pub id: u32,
     /// Payload as sent. MAVLink 2 truncates its trailing zeros.
     pub payload: &'a [u8],
@@ -73,9 +74,9 @@ pub struct Frame<'a> {
 pub struct FrameCounts {
     /// Complete frames with a valid CRC.
     pub good: u64,
-    /// Candidates with an invalid CRC.
+    /// Candidates with an invalid CRC, or with an unknown message id and no start marker behind them.
     pub bad_crc: u64,
-    /// Plausible frames of messages outside the dialect, whose CRC cannot be checked.
+    /// Plausible frames of messages outside the dialect (the set of known messages). Their CRC cannot be checked.
     pub unknown: u64,
     /// Candidates that are longer than the rest of the datagram.
     pub truncated: u64,
@@ -102,7 +103,7 @@ impl FrameCounts {
     }
 }
 
-/// Classification of the bytes from a start marker on.
+/// Classification of a candidate by [`examine`].
 enum Candidate<'a> {
     Frame(Frame<'a>),
     BadCrc,
@@ -124,7 +125,7 @@ pub fn frame_len(bytes: &[u8]) -> Option<usize> {
     }
 }
 
-/// Classifies the bytes from a start marker on.
+/// Classifies `bytes`, which begin with a start marker.
 fn examine(bytes: &[u8]) -> Candidate<'_> {
     let v1 = bytes[0] == STX_V1;
     let header = if v1 { HEADER_V1 } else { HEADER_V2 };
@@ -177,7 +178,7 @@ pub struct Frames<'a, 'c> {
     counts: &'c mut FrameCounts,
     frames_left: u32,
     starts_left: u32,
-    /// Whether more bytes may follow. An incomplete candidate is then kept.
+    /// Whether more bytes may follow. If so, an incomplete candidate is kept.
     waits: bool,
 }
 
@@ -193,7 +194,7 @@ impl<'a, 'c> Frames<'a, 'c> {
         }
     }
 
-    /// Skips a false start: one byte, or all bytes after too many false starts.
+    /// Skips the first byte, which is a false start. After too many false starts, drops all bytes.
     fn false_start(&mut self) {
         match self.starts_left.checked_sub(1) {
             Some(left) => {
@@ -211,7 +212,7 @@ impl<'a, 'c> Frames<'a, 'c> {
 }
 
 /// Whether a frame of `len` bytes with an unknown message ends at the end of the bytes or before another start marker.
-/// Otherwise it counts as noise, because skipping its length could drop valid frames.
+/// If not, it counts as noise, because skipping `len` bytes could skip valid frames.
 fn ends_well(bytes: &[u8], len: usize) -> bool {
     bytes.get(len).is_none_or(|next| matches!(*next, STX_V1 | STX_V2))
 }
@@ -272,8 +273,8 @@ impl<'a> Iterator for Frames<'a, '_> {
     }
 }
 
-/// Delivers every frame unmodified for a router, including unknown messages. Known frames come with their decoded
-/// header.
+/// Delivers the bytes of every frame in `bytes`, including frames of unknown messages, for a router. Frames of known
+/// messages are also delivered in parsed form.
 pub fn pieces<'a>(bytes: &'a [u8], mut deliver: impl FnMut(&'a [u8], Option<Frame<'a>>)) {
     let mut counts = FrameCounts::default();
     let mut frames = Frames::new(bytes, &mut counts);
@@ -300,8 +301,8 @@ impl StreamCutter {
         self.cut(true, deliver);
     }
 
-    /// Discards an incomplete candidate, for instance after a silence of the stream, and delivers the frames behind it.
-    /// A false start marker would otherwise delay these frames.
+    /// Discards an incomplete candidate and delivers the frames behind its start marker. It is called after a silence of the
+    /// stream. Without it, a false start marker could delay these frames.
     pub fn flush(&mut self, deliver: impl FnMut(Frame<'_>)) {
         self.cut(false, deliver);
     }
@@ -342,8 +343,8 @@ impl StreamCutter {
     }
 }
 
-/// Encodes one frame. MAVLink 2 truncates the payload's trailing zeros. `None` for a message outside the dialect, and
-/// for ids above 255 in MAVLink 1.
+/// Encodes one unsigned frame. MAVLink 2 truncates the payload's trailing zeros. `None` for a message outside the dialect,
+/// and for ids above 255 in MAVLink 1.
 pub fn write(
     version: Version,
     sequence: u8,

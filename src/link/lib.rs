@@ -1,8 +1,8 @@
 //! MAVLink: addresses, transports, frames, and the links to the vehicle and to clients.
 //!
-//! Only the transport has sockets and a clock. All other modules take bytes and time as arguments and return bytes.
-//! [`transport`] runs on tokio and passes datagrams and streams through channels. [`vehicle`] connects to the flight
-//! controller, [`client`] to ground stations and offboard programs. Only `wire` uses MAVLink message types.
+//! Only [`transport`] has sockets and a clock. It runs on tokio and passes the received bytes on through channels. All other
+//! modules take bytes and time as arguments and return bytes. [`vehicle`] connects to the flight controller, [`client`] to
+//! ground stations and offboard programs. Only `wire` uses MAVLink message types.
 //!
 //! Example of a control thread (`pilot` is any [`autopilot::Autopilot`]):
 //!

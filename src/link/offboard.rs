@@ -1,4 +1,5 @@
-//! An offboard client for the demonstration, the counterpart of [`client`](super::client).
+//! A MAVLink client that commands attitudes in OFFBOARD mode, for `greylag demo`. It talks to the server in
+//! [`client`](super::client).
 
 use super::autopilot::Mode;
 use super::framing::{FrameCounts, Frames, Source, Version};
@@ -6,9 +7,9 @@ use super::wire::{Message, offboard};
 
 pub use super::wire::offboard::Heard;
 
-/// Address of the autopilot: system 1, component 1.
+/// MAVLink ids of the autopilot: system 1, component 1.
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
-/// Ids of this client: an onboard computer of the same system.
+/// MAVLink ids of this client: an onboard computer (component 191) of the same system.
 const OURSELVES: Source = Source { system: 1, component: 191 };
 
 /// Command number of MAV_CMD_COMPONENT_ARM_DISARM.
@@ -16,7 +17,7 @@ pub const ARM: u32 = 400;
 /// Command number of MAV_CMD_DO_SET_MODE.
 pub const SET_MODE: u32 = 176;
 
-/// A session with one autopilot, without sockets and clocks.
+/// A session with one autopilot. It has no sockets and no clock.
 #[derive(Clone, Debug, Default)]
 pub struct OffboardClient {
     sequence: u8,
@@ -34,7 +35,7 @@ impl OffboardClient {
         self.frame(&offboard::attitude_target(AUTOPILOT, time_ms, roll, pitch))
     }
 
-    /// Encodes the arming command.
+    /// Encodes the command that arms the aircraft.
     pub fn arm(&mut self) -> Vec<u8> {
         self.frame(&offboard::arm(AUTOPILOT))
     }

@@ -1,6 +1,7 @@
-//! Routing between clients and a flight controller.
+//! Routing of MAVLink frames between clients and a flight controller.
 //!
-//! Frames for other components are forwarded unmodified to the peer from which frames of their target were received.
+//! Frames that are not addressed to this program are forwarded unmodified. A frame from the controller to a
+//! target goes to the peers from which frames of that target have arrived. A frame without a target goes to all peers.
 
 use std::time::Duration;
 
@@ -20,21 +21,21 @@ pub enum Way {
     Controller,
     /// The frame is only handled by this program.
     Ours,
-    /// The frame is dropped: it carries this program's ids, would override the holder of control authority, or would
-    /// disclose a signing key.
+    /// The frame is dropped. It has this program's own ids as its source, commands the aircraft while this program has control
+    /// authority, or contains a signing key.
     Nowhere,
 }
 
-/// The routing table: the peers from which frames of each system and component were received.
+/// The routing table. It lists the peers from which frames of each system and component have arrived.
 #[derive(Clone, Debug, Default)]
 pub struct Router {
     routes: Vec<(Source, PeerId, Duration)>,
-    /// Number of clients' frames that were dropped instead of forwarded to the controller.
+    /// Number of frames from clients that were dropped ([`Way::Nowhere`]).
     pub held: u64,
 }
 
 impl Router {
-    /// Adds a route for each sender in a client's frames.
+    /// Adds or renews a route for the sender of each frame in `bytes`, which `peer` has sent. Removes old routes.
     pub fn learn(&mut self, host: Duration, peer: PeerId, bytes: &[u8]) {
         pieces(bytes, |_, frame| {
             let Some(Frame { source, .. }) = frame else { return };
@@ -53,8 +54,8 @@ impl Router {
         self.routes.retain(|(_, at, _)| *at != peer);
     }
 
-    /// The frames of a client that are forwarded to the controller, unmodified. `us` is this program's identity.
-    /// `engaged` is whether this program has control authority.
+    /// Those frames of `bytes` from a client that are forwarded to the controller. `us` identifies this program. `engaged` states
+    /// whether this program has control authority.
     pub fn to_controller(&mut self, bytes: &[u8], us: Source, engaged: bool) -> Vec<u8> {
         let mut on = Vec::new();
         let mut held = 0;
@@ -67,8 +68,8 @@ impl Router {
         on
     }
 
-    /// The frames of the controller that are forwarded to `peer`: broadcasts, and frames for a system and component
-    /// from which `peer` has delivered frames. A signing key is never forwarded.
+    /// Those frames of `bytes` from the controller that are forwarded to `peer`: broadcasts, and frames for a system and
+    /// component whose frames `peer` has sent before. SETUP_SIGNING, which contains a secret key, is never forwarded.
     pub fn to_client(&self, bytes: &[u8], peer: PeerId) -> Vec<u8> {
         let mut on = Vec::new();
         pieces(bytes, |bytes, frame| {
@@ -95,7 +96,7 @@ impl Router {
 
 /// Destination of a client's frame.
 pub fn way(frame: Option<&Frame<'_>>, us: Source, engaged: bool) -> Way {
-    // unknown messages cannot be decoded and are forwarded
+    // a frame of an unknown message cannot be decoded and is forwarded
     let Some(frame) = frame else { return Way::Controller };
     if frame.source == us || frame.id == wire::SETUP_SIGNING {
         return Way::Nowhere;

@@ -1,8 +1,9 @@
 //! MAVLink 2 message signing: signs outgoing frames and verifies received frames.
 //!
 //! According to the MAVLink guide, the signature is the first 48 bits of the SHA-256 of key, frame, link id and
-//! timestamp. Timestamps (units of 10 µs since 2015) increase in each stream of a sender. The signing of the crate
-//! `mavlink` is not used, because its timestamp cannot be read and stored for the next start.
+//! timestamp. A stream is all frames with the same system id, component id and link id. Timestamps (units of 10 µs since
+//! 2015) must increase from frame to frame of a stream. The signing of the crate `mavlink` is not used, because its
+//! timestamp cannot be read and stored for the next start.
 
 mod key;
 mod stamp;
@@ -26,9 +27,10 @@ const CHECKSUM: usize = 2;
 const BLOCK: usize = 13;
 /// Length of the signature field in bytes.
 const SIGNATURE: usize = 6;
-/// Largest lag of the first timestamp of a new stream behind the newest timestamp: 1 min, in units of 10 µs.
+/// The first timestamp of a new stream may be at most this much older than the newest timestamp of all: 1 min, in units of
+/// 10 µs.
 const MINUTE: u64 = 6_000_000;
-/// Largest number of streams that are remembered. Only a holder of the key can add a stream.
+/// Largest number of streams that are accepted. Only a holder of the key can add a stream.
 const MAX_STREAMS: usize = 1024;
 /// Largest timestamp, which has 48 bits.
 const STAMP_MAX: u64 = (1 << 48) - 1;
@@ -51,8 +53,8 @@ pub struct SigningCounts {
     pub unsigned: u64,
     /// Received frames with an invalid signature (another key or modified content), which were refused.
     pub forged: u64,
-    /// Received frames that were refused for their timestamp: not newer than the last of its stream, or more than a
-    /// minute old in a new stream.
+    /// Received frames that were refused for their timestamp: not newer than the last of their stream, or more than a
+    /// minute old in a new stream. Also frames of new streams beyond the largest number of streams.
     pub replayed: u64,
     /// MAVLink 1 frames that were not sent, because they cannot be signed.
     pub unsignable: u64,
@@ -69,7 +71,7 @@ impl SigningCounts {
 #[derive(Debug)]
 pub struct Signer {
     key: Key,
-    /// The newest timestamp, sent or received, in units of 10 µs since 2015.
+    /// The newest timestamp of the clock or of any frame, sent or received, in units of 10 µs since 2015.
     stamp: u64,
     streams: HashMap<(u8, Source), u64>,
     counts: SigningCounts,
@@ -91,8 +93,8 @@ impl Signer {
         self.counts
     }
 
-    /// The frames of `bytes`, signed with the link id `link` at `unix_us` (µs since 1970). A frame that already has a
-    /// signature stays unmodified. A MAVLink 1 frame is dropped.
+    /// Returns the frames of `bytes`, signed with the link id `link` at the time `unix_us` (µs since 1970). A frame that already
+    /// has a signature stays unmodified. A MAVLink 1 frame is dropped.
     pub fn sign(&mut self, unix_us: u64, link: u8, bytes: &[u8]) -> Vec<u8> {
         let mut signed = Vec::with_capacity(bytes.len() + BLOCK);
         pieces(bytes, |frame, _| match (frame[0] == STX, frame[2] & FLAG_SIGNED != 0) {
@@ -110,8 +112,8 @@ impl Signer {
         let end = frame.len() - CHECKSUM;
         out.extend_from_slice(frame);
         out[from + 2] |= FLAG_SIGNED;
-        // The checksum is affine in the bytes that it covers. Its change therefore does not depend on the message's
-        // CRC_EXTRA, which is not known for every message.
+        // The CRC of two messages of equal length differs by a value that does not depend on CRC_EXTRA, the seed
+        // byte of the message type. CRC_EXTRA is not known for every message.
         let change =
             calculate_crc(&frame[1..end], 0) ^ calculate_crc(&out[from + 1..from + end], 0);
         let checksum = u16::from_le_bytes([frame[end], frame[end + 1]]) ^ change;
@@ -123,7 +125,7 @@ impl Signer {
         self.counts.signed += 1;
     }
 
-    /// The signature over the bytes `before` it.
+    /// The signature of a frame, computed from all bytes `before` the signature.
     fn signature(&self, before: &[u8]) -> [u8; SIGNATURE] {
         let hash = Sha256::new().chain_update(self.key.bytes()).chain_update(before).finalize();
         let mut signature = [0; SIGNATURE];
@@ -131,8 +133,8 @@ impl Signer {
         signature
     }
 
-    /// The frames of `bytes` whose signature is valid at `unix_us` (µs since 1970), unmodified. All other frames are
-    /// dropped and counted.
+    /// Returns the frames of `bytes` with a valid signature and timestamp, unmodified. `unix_us` is the present time (µs since
+    /// 1970). All other frames are dropped and counted.
     pub fn believed(&mut self, unix_us: u64, bytes: &[u8]) -> Vec<u8> {
         self.stamp = self.stamp.max(stamp_of(unix_us));
         let mut believed = Vec::with_capacity(bytes.len());
@@ -188,7 +190,7 @@ mod tests {
     use super::*;
     use crate::framing::Version;
 
-    /// About 21 November 2026, µs since 1970.
+    /// 18 November 2026, µs since 1970.
     const NOW: u64 = 1_795_000_000_000_000;
 
     fn key(byte: u8) -> Key {
@@ -222,7 +224,7 @@ mod tests {
         assert!(them.believed(NOW, &heartbeat(0)).is_empty());
         let forged = Signer::new(key(2), 0).sign(NOW, 0, &heartbeat(0));
         assert!(them.believed(NOW, &forged).is_empty());
-        // Signed two minutes ago, by a stream that was not received before.
+        // This frame was signed two minutes ago, in a stream of which nothing was received before.
         let old = Signer::new(key(1), 0).sign(NOW - 120_000_000, 0, &heartbeat(0));
         assert!(them.believed(NOW, &old).is_empty());
         let counts = them.counts();

@@ -1,8 +1,9 @@
-//! Sockets and serial ports: all links run on one thread, with channels to the control thread.
+//! Sockets and serial ports. All links run on one thread, the network thread, which exchanges bytes with the control thread
+//! through channels.
 //!
-//! Received bytes go into a bounded channel that the caller chooses for each link. Traffic of the vehicle can thus be
-//! served before that of the clients. Frames to send go into a bounded channel of the link. A full channel drops frames
-//! and counts them. No call blocks.
+//! Received bytes go into a bounded channel that the caller chooses for each link. The vehicle's bytes can therefore be served
+//! before those of the clients. Frames to be sent go into a bounded channel of the link. If a channel is full, frames are
+//! dropped and counted. No call blocks.
 
 mod flood;
 mod serial;
@@ -26,15 +27,16 @@ pub use serial::SerialFault;
 
 /// Capacity of a link's outgoing queue, frames.
 const OUTBOX: usize = 1024;
-/// Interval between the counted rounds of the network thread.
+/// Interval at which the network thread increments its counter of rounds. The control thread detects from this counter that the
+/// network thread is stalled.
 const ROUND: Duration = Duration::from_millis(10);
 
-/// Bytes from a peer: one datagram, or complete frames of a stream.
+/// Bytes received from a peer: one datagram, or complete frames of a byte stream.
 #[derive(Clone, Debug)]
 pub struct Packet {
     /// Sender of the bytes.
     pub peer: PeerId,
-    /// The received bytes.
+    /// The bytes that were received.
     pub bytes: Vec<u8>,
     /// Time of arrival, host clock.
     pub arrived: Instant,
@@ -43,13 +45,13 @@ pub struct Packet {
 /// Event on a link.
 #[derive(Clone, Debug)]
 pub enum Arrival {
-    /// Bytes were received.
+    /// Bytes were received from a peer.
     Packet(Packet),
     /// A TCP connection or a serial port was opened. Frames can be sent to the peer before it has sent any.
     Opened(PeerId),
     /// A TCP connection or a serial port was closed.
     Closed(PeerId),
-    /// A condition of the link that is reported to the user.
+    /// A remark for the user.
     Remark(Remark),
 }
 
@@ -76,7 +78,7 @@ pub enum Remark {
     },
 }
 
-/// A link cannot be opened.
+/// Reason why a link cannot be opened.
 #[derive(Debug, Error)]
 pub enum TransportError {
     /// The address is invalid.
@@ -152,7 +154,7 @@ fn count(counter: &AtomicU64) {
     counter.fetch_add(1, Ordering::Relaxed);
 }
 
-/// The link as its receiving tasks see it.
+/// Data of a link that its receiving tasks need.
 #[derive(Clone)]
 struct Port {
     id: LinkId,
@@ -175,8 +177,8 @@ impl Port {
         }
     }
 
-    /// Queues the opening or closing of a connection, or a remark. It waits while the channel is full, outside the
-    /// control thread. If a closing were lost, a session would outlive its connection.
+    /// Queues the opening or closing of a connection, or a remark. It runs on the network thread and tries again every 10 ms
+    /// while the channel is full. If a closing were dropped, the session of the peer would outlive its connection.
     async fn announce(&self, mut arrival: Arrival) {
         while let Err(crossbeam_channel::TrySendError::Full(back)) = self.inbox.try_send(arrival) {
             arrival = back;
@@ -196,7 +198,7 @@ pub struct Network {
 }
 
 impl Network {
-    /// Starts the network thread without links.
+    /// Starts the network thread. It has no links yet.
     pub fn start() -> Result<Self, TransportError> {
         let runtime =
             Builder::new_current_thread().enable_all().build().map_err(TransportError::Thread)?;
@@ -214,20 +216,20 @@ impl Network {
         Ok(Network { handle, rounds, stop: Some(stop), thread: Some(thread), takes_all: false })
     }
 
-    /// Disables the rate limit on links that are opened from now on. A simulation in lockstep sends as fast as it gets
-    /// replies.
+    /// Disables the rate limit on datagrams for links that are opened from now on. A simulation in lockstep sends as fast as it
+    /// gets replies and may exceed this limit.
     pub fn take_all(&mut self) {
         self.takes_all = true;
     }
 
-    /// Rounds of the thread, one per 10 ms while it runs. Between two rounds every socket is polled.
+    /// Number of rounds of the network thread. It grows by one every 10 ms as long as the thread is not stalled.
     pub fn rounds(&self) -> u64 {
         self.rounds.load(Ordering::Relaxed)
     }
 
-    /// Opens a link whose arrivals go to `inbox`. Sockets are bound before the function returns, so a port in use is
-    /// reported at the start. `option` is the command-line option that the error names. A `tcpout:` link connects and
-    /// reconnects by itself.
+    /// Opens a link. Its received bytes and events go to `inbox`. Sockets are bound before the function returns, so a port in
+    /// use is reported at once. `option` is the command-line option that an error names. A `tcpout:` link connects in the
+    /// background and reconnects by itself.
     pub fn open(
         &self,
         id: LinkId,
@@ -244,7 +246,7 @@ impl Network {
             }
             _ => TransportError::Open { address: address.clone(), option, source },
         };
-        // Sockets are registered with the runtime of the thread that serves them.
+        // Sockets are registered with the runtime of the network thread.
         let _entered = self.handle.enter();
         let (local, target) = match address {
             Address::UdpIn(at) => {
@@ -280,7 +282,7 @@ impl Network {
 
 async fn go_rounds(rounds: Arc<AtomicU64>) {
     let mut due = tokio::time::interval(ROUND);
-    // Rounds that were missed in a stall are not made up.
+    // Rounds that were missed in a stall are not counted later.
     due.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     loop {
         due.tick().await;

@@ -1,6 +1,6 @@
 //! The vehicle link, which receives state frames and sends actuator commands.
 //!
-//! [`Vehicle`] is either the simulator's shim ([`sitl`]) or a real flight controller ([`real`]).
+//! [`Vehicle`] is either the simulator's MAVLink side, called shim ([`sitl`]), or a real flight controller ([`real`]).
 
 mod fault;
 pub mod limits;
@@ -20,7 +20,7 @@ pub use sitl::{Sitl, VehicleCounts};
 
 pub use super::wire::sitl::Outputs;
 
-/// Standard deviations of angle of attack and sideslip from vanes, rad. The value is typical of small aircraft.
+/// Standard deviations of angle of attack and sideslip as measured by vanes on small aircraft, rad.
 pub const VANE_SD: [f64; 2] = [0.3 * std::f64::consts::PI / 180.0; 2];
 
 /// The vehicle's state at one instant, complete and in SI units.
@@ -39,8 +39,8 @@ pub struct Telemetry {
     pub incidence_sd: [f64; 2],
     /// Yaw angle ψ, rad.
     pub yaw: f64,
-    /// Time for which the source holds the body rates constant, s: the step of a simulator. 0 for rates sampled at the
-    /// instant.
+    /// Time for which the source holds the body rates constant, s. A simulator holds them for one step. 0 means that the
+    /// rates were sampled at this instant.
     pub rate_hold_s: f64,
     /// Specific force along body x, y, z (forward, right, down), m/s².
     pub specific_force: [f64; 3],
@@ -50,9 +50,9 @@ pub struct Telemetry {
     pub altitude: f64,
     /// Latitude and longitude last received, degrees; NaN before the first position.
     pub position: [f64; 2],
-    /// Velocity over ground last received, NED, m/s; NaN before the first.
+    /// Velocity over ground last received, NED, m/s; NaN before the first velocity.
     pub velocity: [f64; 3],
-    /// Wind velocity last received, NED, m/s; NaN before the first.
+    /// Wind velocity last received, NED, m/s; NaN before the first wind.
     pub wind: [f64; 3],
 }
 
@@ -73,12 +73,12 @@ pub enum Order {
     Late,
 }
 
-/// The companion's demand on the vehicle at one control tick.
+/// The companion's demand on the vehicle at one control tick (10 ms).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
     /// Commanded actuator outputs.
     pub outputs: Outputs,
-    /// Commanded roll and pitch, rad, for a flight controller that is commanded attitudes.
+    /// Commanded roll and pitch, rad, for a flight controller that receives attitude setpoints.
     pub attitude: [f64; 2],
     /// Fault for which control authority is returned; `None` to keep control authority.
     pub fault: Option<Fault>,

@@ -1,4 +1,5 @@
-//! Assessment of a log's channels: which are too slow or frozen, and the findings about them.
+//! Assessment of a log's channels: which of them are too slow or frozen. A channel is a group of columns that are sampled
+//! together. It is frozen while a value stays for much longer than usual.
 
 use super::Sample;
 use super::columns::{COLUMNS, index};
@@ -6,15 +7,15 @@ use super::finding::Finding;
 use super::load::Channel;
 use super::phases::{self, Flying, PhaseKind};
 
-/// Sample rate of body rates and commands that a study needs, Hz.
+/// Sample rate of body rates and commands that comparison and diagnosis need, Hz.
 pub(super) const WANTED_HZ: f64 = 10.0;
 /// Fraction of a required rate below which a channel is too slow. The margin is for uneven sample times.
 const SLACK: f64 = 0.8;
-/// Sample rate of attitude and airspeed that a study needs, Hz.
+/// Sample rates of attitude and airspeed that comparison and diagnosis need, Hz.
 const ATTITUDE_HZ: f64 = 5.0;
 const AIRSPEED_HZ: f64 = 1.0;
 
-/// Sample rate of a column that a study needs, Hz; `None` for a column that may be slow.
+/// Sample rate of `column` that comparison and diagnosis need, Hz; `None` for a column that may be slow.
 pub(super) fn wanted_hz(column: &str) -> Option<f64> {
     match column {
         "p_radps" | "q_radps" | "r_radps" => Some(WANTED_HZ),
@@ -25,7 +26,7 @@ pub(super) fn wanted_hz(column: &str) -> Option<f64> {
     }
 }
 
-/// Rate of new values of a channel, Hz.
+/// Rate of measured values of a channel, Hz. Interpolated values do not count.
 pub(super) fn real_hz(channel: &Channel) -> f64 {
     match channel.quality.interpolated {
         true => channel.quality.native_hz.min(channel.rate_hz),
@@ -33,12 +34,12 @@ pub(super) fn real_hz(channel: &Channel) -> f64 {
     }
 }
 
-/// The required rate, Hz, if a channel is too slow for `column`; `None` if it is fast enough.
+/// The required rate of `column`, Hz, if its channel is too slow; `None` if it is fast enough.
 pub(super) fn too_slow(channel: &Channel, column: &str) -> Option<f64> {
     wanted_hz(column).filter(|wanted| real_hz(channel) < SLACK * wanted)
 }
 
-/// Findings about interpolated samples, and about spikes if the log has a flight.
+/// Returns findings about interpolated samples, and about spikes if the log has a flight.
 pub(super) fn channels(channels: &[Channel], rows: &[Sample], flies: &Flying) -> Vec<Finding> {
     let lines = |wrong: bool| -> Vec<String> {
         let lines = channels.iter().filter(|c| c.quality.interpolated);
@@ -108,8 +109,7 @@ pub(super) fn freeze(rows: &mut [Sample], channels: &[Channel], flies: &Flying) 
     out
 }
 
-/// Columns whose frozen values make a row unusable. The airspeed is not among them, because it may be missing for a
-/// while.
+/// Columns whose frozen values make a row unusable. A row without airspeed stays usable.
 const OF_A_ROW: [&str; 5] = ["roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps"];
 
 /// Whether the row lacks a required column because its channel is frozen.

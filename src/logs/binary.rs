@@ -1,4 +1,8 @@
-//! Resamples the topics of a binary log onto one table and checks it.
+//! Resamples the topics of a binary log onto one table and checks the table. A topic is a kind of message or record with its own
+//! sample rate.
+//!
+//! A log is read either for a computation or for an inspection (`greylag logs info`). Defects that are errors in a computation
+//! become findings in an inspection. Of a long log, an inspection keeps only some stretches.
 
 use std::path::Path;
 
@@ -12,10 +16,10 @@ use super::topics::{Naming, Topics};
 use super::vehicle::{self, Kind, Vehicle};
 use super::{Flight, FlowAngles, Format, Sample, assess, derive, rows, screening, table};
 
-/// The log made from `topics`. `path` appears in errors, `name` is the name of the flight.
+/// Makes a log from `topics`. `path` appears in errors, `name` is the name of the flight, `to` is the purpose.
 ///
 /// # Errors
-/// The log lacks a required column, has too many unusable rows, or is of a vehicle without wings.
+/// For a computation: if the log lacks a required column, has too many unusable rows, or is of a vehicle without wings.
 pub(super) fn read(
     format: Format,
     mut topics: Topics,
@@ -29,7 +33,7 @@ pub(super) fn read(
     let mut findings = refused(vehicle.as_ref(), path, to)?;
     let no_wings = !findings.is_empty();
     let mut table = table::build(&topics, &o.mapping.rules(format, &topics), &o.sources);
-    // The topics are freed, because a long log must not be in memory twice.
+    // the topics are freed, so that a long log is not in memory twice
     topics.topics.clear();
     let flies = Flying { bridged_s: bridged_s(&table), ..o.flies };
     let stretches = table.whole.take().map(|whole| of_all(whole, &hovers, &o.flies));
@@ -77,15 +81,16 @@ pub(super) fn read(
     })
 }
 
-/// An inspection keeps only stretches of a long log. Returns the longest time between them, s; 0 if the whole log is
-/// kept.
+/// Time (s) without rows that must not split a phase of flight. It is longer than any interval between the kept stretches of the
+/// log, and 0 if the whole log is kept.
 fn bridged_s(table: &table::Table) -> f64 {
     let Some(whole) = &table.whole else { return 0.0 };
     let step = |w: &[Sample]| w[1].time_s - w[0].time_s;
     table.rows.windows(2).map(step).fold(0.0, f64::max).max(whole.stretches.length_s) + 1.0
 }
 
-/// Adds the phases of the whole log to the stretches. The `hovers` (start and end, s) are left out.
+/// The stretches with the phases (ground or flight) of the whole log. `hovers` are the intervals (start and end, s) in which a
+/// VTOL hovers. They are left out.
 fn of_all(mut whole: table::Whole, hovers: &[(f64, f64)], flies: &Flying) -> Stretches {
     whole.air.retain(|s| !hovers.iter().any(|(from, to)| (*from..*to).contains(&s.time_s)));
     let mut phases = phases::phases(&whole.air, flies);
@@ -95,7 +100,7 @@ fn of_all(mut whole: table::Whole, hovers: &[(f64, f64)], flies: &Flying) -> Str
     Stretches { phases, ..whole.stretches }
 }
 
-/// Findings on the rows of wing-borne flight. `hovers` (start and end, s) are the intervals outside it.
+/// Findings on `rows`, which contain wing-borne flight only. `hovers` are the intervals (start and end, s) of hover.
 fn on_wings(rows: &[Sample], hovers: &[(f64, f64)], flies: &Flying) -> Vec<Finding> {
     match rows.is_empty() && !hovers.is_empty() {
         true => vec![Finding::problem(NEVER_ON_WINGS)],
@@ -103,10 +108,10 @@ fn on_wings(rows: &[Sample], hovers: &[(f64, f64)], flies: &Flying) -> Vec<Findi
     }
 }
 
-/// Text of the finding on a log in which the vehicle only hovers.
+/// Text of the finding for a log in which the vehicle only hovers.
 const NEVER_ON_WINGS: &str = "there is no flight in this log: the vehicle never flies on its wings alone; give a log with forward flight";
 
-/// Finding for a vehicle without wings; an error if the log is used for computation.
+/// The finding that the vehicle has no wings, if so. In a computation it is an error.
 fn refused(vehicle: Option<&Vehicle>, path: &Path, to: Use) -> Result<Vec<Finding>, LogError> {
     match vehicle.and_then(Vehicle::refusal) {
         Some(why) if to == Use::Compute => Err(LogError::Vehicle { path: path.to_owned(), why }),
@@ -114,8 +119,7 @@ fn refused(vehicle: Option<&Vehicle>, path: &Path, to: Use) -> Result<Vec<Findin
     }
 }
 
-/// Findings about required columns without data. If the log is used for computation, the first such column is an
-/// error.
+/// The finding that required columns have no data, if so. In a computation the first such column is an error.
 fn lacking(
     table: &table::Table,
     topics: &Topics,
@@ -127,7 +131,7 @@ fn lacking(
         ([first, ..], Use::Compute) => Err(missing_column(path, topics, first)),
         ([one], _) => Ok(vec![Finding::problem(missing_column(path, topics, one).to_string())]),
         (several, _) => {
-            // Columns with the same remedy are listed together.
+            // columns with the same remedy are listed together
             let mut groups: Vec<(String, Vec<String>)> = Vec::new();
             for missing in several {
                 let (remedy, column) = (would_fill(topics, missing), either(missing));
@@ -148,7 +152,7 @@ fn lacking(
     }
 }
 
-/// Removes the rows outside wing-borne flight. Returns a finding about them.
+/// Removes the rows in the intervals `hovers`, in which a VTOL is not in wing-borne flight. Returns a finding about them.
 fn grounded(
     rows: &mut Vec<Sample>,
     hovers: &[(f64, f64)],
@@ -169,13 +173,13 @@ fn grounded(
     }
 }
 
-/// Whether a factor turns degrees into radians.
+/// Whether the factor `gain` converts degrees into radians, apart from the sign.
 fn near_degree(gain: f64) -> bool {
     (gain.abs() / 1_f64.to_radians() - 1.0).abs() < 0.01
 }
 
-/// Rewrites the correction of a finding. The text then names the topic and field that the reader uses, and the whole
-/// factor.
+/// Adapts the correction that a finding proposes to a binary log. The text then names the topic and the field that fill the
+/// column. The reader multiplies this field by a factor itself, so the proposed factor includes that factor.
 fn named(finding: Finding, rules: &[Rule], o: &Options) -> Finding {
     let Some(cure) = &finding.cure else { return finding };
     let rule = rules.iter().find(|r| r.columns()[0] == cure.column && r.factor().is_some());
@@ -197,7 +201,7 @@ fn named(finding: Finding, rules: &[Rule], o: &Options) -> Finding {
     Finding { text: finding.text.replace(&cure.to_string(), &better), ..finding }
 }
 
-/// Times (from, to, s) at which a VTOL was not in wing-borne flight.
+/// Intervals (from, to, s) in which a VTOL is not in wing-borne flight; empty for other vehicles.
 fn hovers(
     vehicle: Option<&Vehicle>,
     format: Format,
@@ -210,7 +214,8 @@ fn hovers(
     }
 }
 
-/// AOA.AOA and AOA.SSA are estimates unless a mapping names them as sensors.
+/// Whether α and β are measured or estimated. In a DataFlash log (ArduPilot) they are the autopilot's estimates, unless a mapping
+/// names a source for α.
 fn flow_angles(format: Format, o: &Options) -> FlowAngles {
     match format {
         Format::Dataflash if o.mapping.get("alpha_rad").is_none() => FlowAngles::Estimated,
@@ -218,8 +223,8 @@ fn flow_angles(format: Format, o: &Options) -> FlowAngles {
     }
 }
 
-/// Returns the usable rows of the flight. Too few of them are an error for a computation, and a finding for an
-/// inspection.
+/// Returns the usable rows of the flight. Too many unusable rows are an error in a computation. In an inspection they are a
+/// finding, and all rows are returned. All rows are also returned if a required column has no data.
 fn kept(
     table: &mut table::Table,
     path: &Path,
@@ -244,7 +249,8 @@ fn kept(
     Ok(visible(&table.rows))
 }
 
-/// An empty table for usable rows. If the airspeed is missing in some of them, columns of slow sensors may be empty.
+/// An empty table for the usable rows of `samples`. If the airspeed is missing in any row, a usable row may have empty fields in
+/// the columns of slow sensors.
 fn usable(samples: &[Sample]) -> rows::Rows {
     let hangs = samples.iter().any(|s| s.airspeed_mps.is_nan());
     match hangs {
@@ -253,7 +259,7 @@ fn usable(samples: &[Sample]) -> rows::Rows {
     }
 }
 
-/// The rows for inspection, complete or not.
+/// All rows of `samples`, complete or not, for an inspection.
 fn visible(samples: &[Sample]) -> rows::Rows {
     let mut kept = rows::Rows::default();
     samples.iter().enumerate().for_each(|(i, sample)| kept.take_incomplete(i + 1, *sample));
@@ -270,7 +276,7 @@ fn missing_column(path: &Path, topics: &Topics, missing: &table::Missing) -> Log
     LogError::Missing { path: path.to_owned(), column: missing.column, remedy }
 }
 
-/// The column with its alternative, in words.
+/// The name of the missing column, with its alternative if there is one.
 fn either(missing: &table::Missing) -> String {
     match missing.or {
         Some(or) => format!("`{}` (or `{or}`)", missing.column),
@@ -278,7 +284,7 @@ fn either(missing: &table::Missing) -> String {
     }
 }
 
-/// Advice on which records to log for the column, in words.
+/// Advice to the user on which records would fill the missing column.
 fn would_fill(topics: &Topics, missing: &table::Missing) -> String {
     match (missing.looked_for.is_empty(), topics.naming) {
         (true, Naming::Sender) if missing.or.is_some() => "record SERVO_OUTPUT_RAW with the parameters SERVOn_FUNCTION, which say what each output moves".to_owned(),
@@ -288,7 +294,7 @@ fn would_fill(topics: &Topics, missing: &table::Missing) -> String {
     }
 }
 
-/// The topics of the log, in words.
+/// A sentence that lists the topics of the log.
 fn holds(topics: &Topics) -> String {
     let mut has: Vec<&str> = topics.counts.keys().map(|(name, _)| name.as_str()).collect();
     has.dedup();

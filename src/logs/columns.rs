@@ -1,10 +1,10 @@
-//! The columns of the log format: their names and their fields in a sample.
+//! The columns of Greylag's log format: their names, and the fields of [`Sample`] that hold their values.
 
 use super::Sample;
 
-/// Reads the value of a column from a sample.
+/// Function that reads the value of a column from a sample.
 pub(super) type Get = fn(&Sample) -> f64;
-/// Gives mutable access to the value of a column in a sample.
+/// Function that gives mutable access to the value of a column in a sample.
 pub(super) type Place = fn(&mut Sample) -> &mut f64;
 
 /// The columns of the format in the order in which they are written: name, read access, mutable access.
@@ -39,13 +39,13 @@ pub(super) const COLUMNS: [(&str, Get, Place); 29] = [
     ("pitch_target_rad", |s| s.pitch_target_rad, |s| &mut s.pitch_target_rad),
     ("rate_hold_s", |s| s.rate_hold_s, |s| &mut s.rate_hold_s),
 ];
-/// Number of rows of a block. All columns of a block are read before those of the next block, so that the block stays
-/// in the processor's cache.
+/// Number of rows of a block. Code that evaluates every column processes the rows in blocks, all columns of one block before
+/// the next block, so that a block stays in the processor's cache.
 pub(super) const BLOCK: usize = 512;
 /// Columns that a flight log must have.
 pub(super) const NEEDED: [&str; 7] =
     ["time_s", "roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps", "airspeed_mps"];
-/// Command and position of each actuator. A flight log must have one of the two.
+/// Columns with the command and the position of each actuator. A flight log must have at least one of the two.
 pub(super) const EITHER: [(&str, &str); 3] = [
     ("aileron_cmd", "aileron_rad"),
     ("elevator_cmd", "elevator_rad"),
@@ -57,12 +57,12 @@ pub(super) fn index(name: &str) -> Option<usize> {
     COLUMNS.iter().position(|c| c.0 == name)
 }
 
-/// Whether a column is a command or a commanded angle. Its value holds until the next sample.
+/// Whether a column is a command or a commanded angle, whose value holds until the next sample.
 pub(super) fn is_held(name: &str) -> bool {
     name.ends_with("_cmd") || name.ends_with("_target_rad")
 }
 
-/// Whether a column wraps at ±π.
+/// Whether a column is an angle that jumps from π to −π.
 pub(super) fn is_wrapped(name: &str) -> bool {
     matches!(name, "roll_rad" | "yaw_rad")
 }

@@ -1,4 +1,4 @@
-//! The CSV form of a flight log: one row a sample, a header row, SI units.
+//! Flight logs as CSV tables: a header row, then one row for each sample, in SI units.
 
 mod airspeed;
 mod dialect;
@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use super::mapping::Mapping;
 use super::{Flight, rows};
 
-/// Why a CSV flight log cannot be read or written.
+/// Reason why a CSV flight log cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum CsvError {
     /// The file cannot be opened, read or written.
@@ -50,7 +50,7 @@ pub enum CsvError {
         path: PathBuf,
         /// Name of the missing column.
         column: &'static str,
-        /// Remedy, in words.
+        /// Text that tells the user how to supply the column.
         remedy: String,
     },
     /// More than 5 % of the rows are unusable.
@@ -78,8 +78,7 @@ pub struct Reading {
     pub flight: Flight,
     /// Columns of the file that the format does not name.
     pub unknown_columns: Vec<String>,
-    /// Number of rows dropped because they are out of order, repeated, non-finite in a required column, or
-    /// impossible.
+    /// Number of dropped rows: out of order, repeated, not finite in a required column, or physically impossible.
     pub dropped: usize,
     /// Numbers of the first dropped rows. The header is row 1.
     pub dropped_rows: Vec<usize>,
@@ -101,7 +100,7 @@ pub fn load(path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
 /// Reads a flight log from bytes; `path` appears in errors.
 ///
 /// # Errors
-/// As [`load`].
+/// The same errors as those of [`load`].
 pub fn parse(bytes: &[u8], path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
     let mut raw = raw(bytes, path, &Mapping::default())?;
     if !raw.missing.is_empty() {
@@ -113,7 +112,7 @@ pub fn parse(bytes: &[u8], path: &Path, tolerance: Tolerance) -> Result<Reading,
     }
 }
 
-/// Drops the unusable rows. If there are too many of them, an error is returned beside the usable rows.
+/// Returns the usable rows. If too many rows are unusable, also returns an error.
 pub(super) fn settle(
     mut raw: Raw,
     path: &Path,
@@ -132,7 +131,8 @@ pub(super) fn settle(
     (reading(raw, rows, path), error)
 }
 
-/// Keeps every row that is later than the last kept one, complete or not, for inspection of the table.
+/// Keeps every row whose time is later than that of the last kept row, even if required values are missing. This serves
+/// the inspection of incomplete tables.
 pub(super) fn keep_all(mut raw: Raw, path: &Path) -> Reading {
     let rows = raw.judged(|rows, number, row, kept| {
         let last = kept.last().map(|last| last.time_s);

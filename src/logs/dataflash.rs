@@ -1,15 +1,15 @@
-//! Reads ArduPilot DataFlash files (`.bin`) into topics.
+//! Reads ArduPilot DataFlash files (`.bin`) into topics: time series of one record type and one instance (such as an IMU).
 //!
 //! The crate `ardupilot-binlog` (0.2.0) is not used. A FMT record with a length below 3 makes it panic. It ends
 //! silently after a number of consecutive errors, so that a truncated log looks complete. It allocates a name and a
 //! list for every record, and does not distinguish instances. `tests/logs_crosscheck.py` compares the results with
 //! pymavlink.
 //!
-//! A backward step in the time of ATT or IMU begins another flight, because a copy of a whole card holds several logs
-//! in succession. The backward step after a single damaged time does not begin one.
+//! If the time of ATT or IMU records steps back, another flight begins, because a copy of a whole card holds several logs in
+//! succession. If a single time is damaged and too large, the step back after it begins no flight.
 //!
-//! Not read: texts except the firmware's name, arrays (`a`), and the units and multipliers of FMTU and MULT. The
-//! format letters `c C e E L` imply a scale, which pymavlink applies too.
+//! Not read: texts except those of parameter names and the firmware's name, arrays (`a`), and the units and multipliers of FMTU
+//! and MULT. The format letters `c C e E L` imply a scale, which pymavlink applies too.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -23,10 +23,10 @@ use super::window::Window;
 
 /// Length of a record's header: two magic bytes and the type.
 pub(super) const HEADER: usize = 3;
-/// Type number of the record FMT, which declares record types, and its length in bytes.
+/// Type number of FMT records, which declare record types, and their length in bytes.
 pub(super) const FMT: u8 = 128;
 const FMT_LEN: usize = 89;
-/// Length of the longest record, bytes. The length of a record has one byte.
+/// Largest possible length of a record, bytes. The length is declared in one byte.
 const LONGEST: usize = 255;
 /// Record types in which a backward step of time begins another flight, and the smallest such step, s.
 const CLOCKS: [&str; 2] = ["ATT", "IMU"];
@@ -36,17 +36,17 @@ const BACK_S: f64 = 1.0;
 struct Declared {
     name: String,
     len: usize,
-    /// Label, format letter and offset after the header (bytes) of each field.
+    /// For each field: label, format letter, and offset from the end of the record's header, bytes.
     fields: Vec<(String, u8, usize)>,
     time: Option<(u8, usize, f64)>,
     instance: Option<(u8, usize)>,
     wanted: bool,
     role: Role,
-    /// Samples that were read, by instance.
+    /// The instances of which records were found.
     read: Vec<Instance>,
 }
 
-/// Purpose of a record type in addition to its numbers.
+/// Special use of a record type, in addition to its numbers.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Role {
     None,
@@ -64,7 +64,7 @@ struct Instance {
     earlier_s: Option<f64>,
 }
 
-/// Size of format `letter`, bytes.
+/// Size of a field with the format `letter`, bytes. `None` for an unknown letter.
 pub(super) fn size(letter: u8) -> Option<usize> {
     Some(match letter {
         b'b' | b'B' | b'M' => 1,
@@ -77,7 +77,7 @@ pub(super) fn size(letter: u8) -> Option<usize> {
     })
 }
 
-/// Number of format `letter`; NaN for texts and beyond the record's end.
+/// Reads the number of format `letter` at `offset`. NaN for texts, arrays and fields beyond the record's end.
 fn number(letter: u8, bytes: &[u8], offset: usize) -> f64 {
     fn take<const N: usize>(bytes: &[u8], offset: usize) -> Option<[u8; N]> {
         bytes.get(offset..)?.first_chunk().copied()
@@ -108,7 +108,8 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(&bytes[..end]).trim().to_owned()
 }
 
-/// The type number and the declaration in the body of a FMT record; `None` if it contradicts itself.
+/// Reads the type number and the declaration in the body of a FMT record. `None` if the body is too short, a format letter is
+/// unknown, or the declared length is shorter than the fields.
 fn declaration(body: &[u8], wanted: &dyn Fn(&str) -> bool) -> Option<(u8, Declared)> {
     let (kind, len) = (*body.first()?, usize::from(*body.get(1)?));
     let (name, letters) = (text(body.get(2..6)?), text(body.get(6..22)?));
@@ -126,7 +127,7 @@ fn declaration(body: &[u8], wanted: &dyn Fn(&str) -> bool) -> Option<(u8, Declar
     let time = find("TimeUS")
         .map(|(letter, offset)| (letter, offset, 1e-6))
         .or_else(|| find("TimeMS").map(|(letter, offset)| (letter, offset, 1e-3)));
-    // The instance is an estimator's core (`C`) or the number of a sensor (`I`).
+    // The field of the instance has the label `C` in records of the estimator (one instance per core) and `I` in others.
     let label = if name.starts_with("XK") { "C" } else { "I" };
     let instance = find(label).filter(|(letter, _)| *letter == b'B');
     let wanted = wanted(&name);
@@ -142,24 +143,24 @@ fn declaration(body: &[u8], wanted: &dyn Fn(&str) -> bool) -> Option<(u8, Declar
 
 #[derive(Default)]
 struct Reader {
-    /// The declared record types by type number. The first declaration of a number counts.
+    /// The declared record types by type number. If a number is declared twice, the first declaration counts.
     declared: Vec<Option<Declared>>,
     keep: Keep,
-    /// The values of the present record.
+    /// Values of the present record's fields.
     values: Vec<f64>,
     out: Topics,
-    /// The flights before the present one.
+    /// Topics of the flights before the present one.
     lives: Vec<Topics>,
     /// Whether the file has more flights than are read.
     full: bool,
-    /// Number of bytes that belong to no record, and the time that is lost at each such place, s.
+    /// Number of bytes that belong to no record, and for each place with such bytes the time between the records around it, s.
     skipped: usize,
     holes: Vec<f64>,
     in_step: bool,
     last_s: f64,
 }
 
-/// Reads the records that `wanted` names. All others are only counted.
+/// Reads the records that `wanted` names, parameters and firmware, and counts all others. Returns the topics of each flight.
 pub(super) fn read<'a>(
     source: &'a mut dyn Read,
     wanted: &dyn Fn(&str) -> bool,
@@ -188,7 +189,7 @@ pub(super) fn read<'a>(
         let Some(body) = view.get(HEADER..len) else {
             break view.len();
         };
-        // If a record lost or gained a byte, no other record begins at its end, and its numbers are invalid.
+        // If bytes of a record were lost or added, no other record begins at its end, and its numbers are invalid.
         let next = &view[len..view.len().min(len + DATAFLASH_MAGIC.len())];
         if kind != FMT && !DATAFLASH_MAGIC.starts_with(next) {
             reader.damaged();
@@ -271,7 +272,7 @@ impl Reader {
         self.sample(kind, place, time_s, body);
     }
 
-    /// Ends the present flight: the records that follow belong to another one.
+    /// Ends the present flight. The following records belong to another one.
     fn another_life(&mut self) {
         let topics = self.gathered();
         let parameters = self.out.parameters.clone();
@@ -279,7 +280,7 @@ impl Reader {
         self.lives.push(Topics { topics, parameters, firmware, ..Topics::default() });
     }
 
-    /// Adds the numbers of a record of type `kind` to the instance with index `place`.
+    /// Adds the numbers of a record of type `kind` to its topic. `place` is the index of the instance in the declared type.
     fn sample(&mut self, kind: u8, place: usize, time_s: f64, body: &[u8]) {
         let Some(Some(declared)) = self.declared.get_mut(usize::from(kind)) else { return };
         self.values.clear();
@@ -289,7 +290,7 @@ impl Reader {
         topic.push(time_s, &self.values);
     }
 
-    /// Removes the samples from the declared types and returns them by the names of the types.
+    /// Moves the topics out of the declared types and returns them by type name and instance number.
     fn gathered(&mut self) -> BTreeMap<(String, u16), Topic> {
         let mut out = BTreeMap::new();
         for declared in self.declared.iter_mut().flatten() {
@@ -314,7 +315,7 @@ impl Reader {
         if self.full {
             self.out.findings.push(too_many());
         }
-        // The last block of a card is padded, so a cut record at the end is usual.
+        // a warning only, because the last block of a card is padded and often ends in a cut record
         if cut > 0 {
             self.out.findings.push(Finding::warning(format!(
                 "the file ends in the middle of a record, {cut} bytes of which are left out"
@@ -353,7 +354,7 @@ fn firmware(declared: &Declared, body: &[u8]) -> Option<String> {
 mod tests {
     use super::*;
 
-    /// A log with attitude records at these times, µs.
+    /// Bytes of a log with attitude records at the times `times_us`, µs.
     fn log(times_us: &[u64]) -> Vec<u8> {
         let padded = |text: &str, width: usize| {
             let mut bytes = text.as_bytes().to_vec();

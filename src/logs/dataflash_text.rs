@@ -1,8 +1,8 @@
 //! Reads the text form of a DataFlash log (`.log`) by conversion to the binary form.
 //!
-//! Mission Planner and older ground stations save the content of a card as lines `NAME, value, …`. FMT lines declare
-//! the record types, as FMT records do in the binary file. Each line is converted back to its binary record. A line
-//! that fits no declaration becomes one byte, which the reader counts as damage.
+//! Mission Planner and older ground stations save the content of a memory card as lines `NAME, value, …`. Lines that begin with
+//! FMT declare the types of records, as FMT records do in the binary file. Each line is converted to its binary record. A line
+//! that fits no declaration becomes one byte, which the reader of the binary form counts as damage.
 
 use std::collections::HashMap;
 use std::io::{self, BufRead, BufReader, Read};
@@ -10,12 +10,12 @@ use std::io::{self, BufRead, BufReader, Read};
 use super::dataflash::{FMT, HEADER, size};
 use super::format::DATAFLASH_MAGIC;
 
-/// Number of lines allowed before the first declaration: firmware, board, free memory.
+/// The first declaration must be among this many lines. Lines on firmware, board and free memory may precede it.
 const HEAD: usize = 20;
-/// Length of the longest line that is read as a whole, bytes.
+/// Length of the longest line that is read as one line, bytes.
 const LONGEST: u64 = 4096;
 
-/// Whether a file that begins with `start` is a DataFlash log in text.
+/// Whether a file that begins with `start` is a DataFlash log in text form.
 pub(super) fn begins(start: &[u8]) -> bool {
     start.split(|b| *b == b'\n').take(HEAD).any(|line| {
         let mut fields = line.split(|b| *b == b',').map(<[u8]>::trim_ascii);
@@ -26,22 +26,22 @@ pub(super) fn begins(start: &[u8]) -> bool {
 /// A reader that converts a text log to the bytes of a binary one.
 pub(super) struct Binary<'a> {
     lines: BufReader<&'a mut dyn Read>,
-    /// Type and format letters of each name.
+    /// For each declared record name: its type number, and the format letters of its fields.
     declared: HashMap<String, (u8, String)>,
-    /// The line before the declarations that names the firmware.
+    /// The line that names the firmware; it precedes the declarations.
     firmware: Option<String>,
     bytes: Vec<u8>,
     from: usize,
 }
 
 impl<'a> Binary<'a> {
-    /// The log in `source`.
+    /// A reader of the text log in `source`.
     pub fn new(source: &'a mut dyn Read) -> Self {
         let (lines, declared) = (BufReader::new(source), HashMap::new());
         Binary { lines, declared, firmware: None, bytes: Vec::new(), from: 0 }
     }
 
-    /// Appends the bytes of the next line to `bytes`; `false` at the end.
+    /// Appends the binary form of the next line to `bytes`. The result is `false` at the end of the log.
     fn next(&mut self) -> io::Result<bool> {
         let mut line = Vec::new();
         if self.lines.by_ref().take(LONGEST).read_until(b'\n', &mut line)? == 0 {
@@ -72,8 +72,8 @@ impl<'a> Binary<'a> {
         Ok(true)
     }
 
-    /// The FMT record of the line `FMT, type, length, name, letters, label, …`. After the declaration of MSG, it is
-    /// followed by a MSG record with the firmware's name.
+    /// The FMT record of the line `FMT, type, length, name, letters, label, …`. If the line declares MSG, a MSG record with the
+    /// firmware's name follows.
     fn declaration(&mut self, line: &str) -> Option<Vec<u8>> {
         let mut fields = line.splitn(6, ',').map(str::trim).skip(1);
         let (kind, _, name) = (fields.next()?, fields.next()?, fields.next()?);
@@ -119,25 +119,24 @@ impl Read for Binary<'_> {
     }
 }
 
-/// The number in a field with the format `letter`; `None` if the text is not a number, so that its line counts as
-/// damaged.
+/// The number in a field with the format `letter`; `None` if the text is not a number. The line then counts as damaged.
 fn number(letter: u8, text: &str) -> Option<f64> {
     match (text.trim().parse::<f64>(), letter) {
         (Ok(x), _) => Some(x),
-        // C libraries write an undefined number in many ways.
+        // C libraries write NaN in many ways, such as `-nan(ind)`
         (Err(_), b'f' | b'd') => Some(f64::NAN),
-        // A flight mode may be written by its name.
+        // a flight mode may be written as its name
         (Err(_), b'M') => Some(0.0),
         (Err(_), _) => None,
     }
 }
 
-/// The record with the values of a line; `None` if there are too few, or if one does not fit the declaration.
+/// The binary record of a line with these values; `None` if there are too few values, or if one does not fit the declaration.
 fn record(kind: u8, letters: &str, values: &[&str]) -> Option<Vec<u8>> {
     let mut out = [&DATAFLASH_MAGIC[..], &[kind]].concat();
     let last = letters.len().checked_sub(1)?;
     for (i, letter) in letters.bytes().enumerate() {
-        // A text in the last field may contain commas.
+        // a text in the last field may contain commas and then spans several values
         let rest = if i == last && b"nNZ".contains(&letter) { values.len() } else { i + 1 };
         let text = values.get(i..rest)?.join(",");
         let x = if b"nNZag".contains(&letter) { 0.0 } else { number(letter, &text)? };

@@ -1,9 +1,8 @@
-//! Computes columns that a log lacks from others, if a mapping requests it.
+//! Computes columns that a log lacks from other columns, if the user's mapping file requests it.
 //!
-//! A motion capture measures position and attitude. Velocity is the slope of a parabola through the positions around
-//! a row. Body rates are fitted in the same way, as slopes of the rotations relative to the row's attitude. The
-//! airspeed is the magnitude of velocity over ground minus a known wind. The mapping states the time span of the
-//! fits. A column is derived only on request.
+//! A motion capture measures position and attitude. A velocity is the slope of a parabola that is fitted to the positions
+//! around a row. Body rates are found in the same way, as slopes of the rotations relative to the row's attitude. The
+//! airspeed is the magnitude of the velocity over ground minus a known wind. The mapping states the time span of the fits.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -14,9 +13,10 @@ use greylag_num::statistics::quantile;
 
 /// Smallest number of rows to which a parabola is fitted.
 const FEWEST: usize = 5;
-/// Residual of a parabola, as a multiple of the log's median residual, beyond which the measurement counts as a jump.
+/// The measurement counts as a jump if the residual of a parabola exceeds the log's median residual by this factor.
 const JUMPED: f64 = 8.0;
-/// Smallest median residual, relative to the size of the fitted values: smaller residuals are rounding.
+/// Smallest residual, as a fraction of the largest value of the column (for rotations, in rad). Smaller residuals are
+/// rounding errors and are raised to it.
 const ROUNDING: f64 = 1e-9;
 /// The columns of the body rates.
 pub(super) const RATES: [&str; 3] = ["p_radps", "q_radps", "r_radps"];
@@ -81,7 +81,8 @@ fn fresh(samples: &[(f64, f64)]) -> Vec<(f64, f64)> {
     samples.iter().map(one).collect()
 }
 
-/// Slope, and root mean square of the residuals, at every sample that has a value; NaN elsewhere.
+/// Slope of the parabola around each sample, and root mean square of its residuals. Both are NaN where a sample has no
+/// value.
 fn slopes_of(samples: &[(f64, f64)], over_s: f64) -> Vec<[f64; 2]> {
     let scale = samples.iter().map(|s| s.1.abs()).filter(|x| x.is_finite()).fold(0.0, f64::max);
     around(
@@ -190,7 +191,7 @@ fn parabola(points: &[(f64, f64)], over_s: f64) -> Option<[f64; 2]> {
     Some([fit[1] / over_s, (left / points.len() as f64).sqrt()])
 }
 
-/// Replaces slopes whose residual exceeds the limit by NaN. Also returns their number.
+/// Returns the slopes of `fits`, with NaN where the residual exceeds `JUMPED` times the median, and the number of these.
 fn settle(fits: Vec<[f64; 2]>) -> (Vec<f64>, usize) {
     let misfits: Vec<f64> = fits.iter().map(|f| f[1]).filter(|x| x.is_finite()).collect();
     let limit = if misfits.is_empty() { f64::INFINITY } else { JUMPED * quantile(&misfits, 0.5) };
@@ -216,7 +217,7 @@ mod tests {
         [derive]\nbody_rates_over_s = 0.07\n[sensors]\nwind_north_mps = { value = 2.0, sd = 0.1 }\n\
         wind_east_mps = { value = 0.0, sd = 0.1 }\n";
 
-    /// A coordinated turn: pitch 0.1 rad, bank 0.5 rad, ψ̇ = 0.6 rad/s, 8 m/s over ground along its heading. The
+    /// A sample of a turn with pitch 0.1 rad, bank 0.5 rad, ψ̇ = 0.6 rad/s, and 8 m/s over ground along its heading. The
     /// velocity columns hold positions, which the mapping differentiates.
     fn turn(k: usize) -> Sample {
         let (t, turn, v) = (0.01 * k as f64, 0.6, 8.0);
@@ -244,7 +245,7 @@ mod tests {
     fn a_turn_has_the_rates_and_the_velocity_of_its_equations() {
         let (rows, _) = derived((0..1000).map(turn).collect());
         for s in &rows[10..990] {
-            // p = −ψ̇ sin θ, q = ψ̇ cos θ sin φ, r = ψ̇ cos θ cos φ; the parabola's error is ω³ T² / 40
+            // p = −ψ̇ sin θ, q = ψ̇ cos θ sin φ, r = ψ̇ cos θ cos φ; a parabola over the time T has the error ω³ T² / 40
             let exact = [
                 -0.6 * 0.1_f64.sin(),
                 0.6 * 0.1_f64.cos() * 0.5_f64.sin(),

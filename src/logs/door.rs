@@ -1,4 +1,4 @@
-//! Opens a log file: unpacks it, recognises UTF-16, and separates the number of a flight from the path.
+//! Opens a log file: unpacks gzip, recognises UTF-16, and splits a path such as `FILE#2` into the file and a flight's number.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -11,7 +11,7 @@ const GZIP: [u8; 2] = [0x1F, 0x8B];
 /// Number of bytes at the start of a file from which its format is recognised.
 pub(super) const LOOK: usize = 4096;
 
-/// A file opened, unpacked if it is compressed, with its first bytes read.
+/// An open file whose first bytes were read. A compressed file is unpacked while it is read.
 pub(super) struct Opened {
     /// The first bytes of the unpacked content.
     pub start: Vec<u8>,
@@ -19,7 +19,7 @@ pub(super) struct Opened {
 }
 
 impl Opened {
-    /// Opens a file.
+    /// Opens the file at `path` and reads its first bytes.
     ///
     /// # Errors
     /// The error of the operating system.
@@ -33,7 +33,7 @@ impl Opened {
         Ok(Opened { start, rest })
     }
 
-    /// The whole unpacked content.
+    /// A reader of the whole unpacked content.
     pub fn reader(self) -> Box<dyn Read> {
         Box::new(io::Cursor::new(self.start).chain(self.rest))
     }
@@ -45,8 +45,8 @@ fn begun(mut source: Box<dyn Read>) -> io::Result<(Vec<u8>, Box<dyn Read>)> {
     Ok((start, source))
 }
 
-/// Splits the path `FILE#2` into the file and the number of the flight in it. The number is `None` if the path has
-/// none, or if a file with the whole name exists.
+/// Splits a path such as `FILE#2` into the file and the number of the flight in it. The number is `None` if the path ends with
+/// none, if a file with the whole name exists, or if no file `FILE` exists.
 pub(super) fn part(path: &Path) -> (PathBuf, Option<usize>) {
     let text = path.to_string_lossy();
     let named = text.rsplit_once('#').and_then(|(file, number)| {

@@ -1,10 +1,10 @@
-//! Why a log cannot be read.
+//! Reasons for which a flight log cannot be read.
 
 use std::path::PathBuf;
 
 use super::csv::CsvError;
 
-/// Why a log cannot be read.
+/// Reason for which a flight log cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// The file cannot be read.
@@ -34,12 +34,12 @@ pub enum LogError {
     Part {
         /// Path of the log.
         path: PathBuf,
-        /// The requested number.
+        /// The requested number of the flight.
         asked: usize,
         /// Number of flights in the file.
         there: usize,
     },
-    /// The vehicle has no wings.
+    /// The log is of a vehicle without wings.
     #[error("flight log {}: {why}", path.display())]
     Vehicle {
         /// Path of the log.

@@ -1,4 +1,4 @@
-//! Findings: defects and peculiarities of a log, for its user.
+//! Findings: defects and peculiarities of a log, which are reported to the user.
 
 use serde::Serialize;
 
@@ -35,7 +35,7 @@ impl std::fmt::Display for Cure {
     }
 }
 
-/// A defect or peculiarity of a log, for its user.
+/// A defect or peculiarity of a log, which is reported to the user.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
     /// How much the finding matters.

@@ -1,4 +1,4 @@
-//! A flight as a table: one sample a row, the columns of the log format.
+//! A flight as a table: each row is a sample, each column a quantity of the log format.
 
 use crate::columns::{COLUMNS, Get, Place};
 use greylag_num::statistics::quantile;
@@ -43,12 +43,12 @@ pub struct Sample {
     pub rudder_cmd: f64,
     /// Commanded throttle position, 0..1.
     pub throttle_cmd: f64,
-    /// Commanded roll φ*, rad (an extra column, `roll_target_rad`).
+    /// Commanded roll φ*, rad (optional column `roll_target_rad`).
     pub roll_target_rad: f64,
-    /// Commanded pitch θ*, rad (an extra column, `pitch_target_rad`).
+    /// Commanded pitch θ*, rad (optional column `pitch_target_rad`).
     pub pitch_target_rad: f64,
-    /// Time for which the body rates are held from this sample, s; 0 for samples at instants (an extra column,
-    /// `rate_hold_s`).
+    /// Time for which a simulator holds the body rates from this sample on, s (optional column `rate_hold_s`); 0 if the rates
+    /// are those at the instant of the sample.
     pub rate_hold_s: f64,
 }
 
@@ -93,7 +93,7 @@ pub enum Sampling {
     Held,
 }
 
-/// Where a log's α and β come from.
+/// Source of the angle of attack α and the sideslip β of a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FlowAngles {
     /// Vanes or another sensor of the flow.
@@ -105,25 +105,25 @@ pub enum FlowAngles {
 
 /// A flight: samples in time order, with the properties of the whole recording.
 ///
-/// Where only the rows matter, `Flight::from(samples)` or `..Flight::default()` fill in the rest.
+/// If only the rows matter, `Flight::from(samples)` or `..Flight::default()` sets everything else to its default.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Flight {
     /// Name of the flight in reports: that of its file.
     pub name: String,
     /// The rows, in time order.
     pub samples: Vec<Sample>,
-    /// Where α and β come from.
+    /// Source of α and β.
     pub flow_angles: FlowAngles,
     /// Known properties of the sensors and of the wind.
     pub sensors: Sensors,
-    /// Channels of the file that the format does not name.
+    /// Columns or channels of the file that the log format does not know.
     pub unknown_columns: Vec<String>,
-    /// Assumptions and derivations of the reader, one sentence each.
+    /// Assumptions and conversions that the reader made, one sentence each.
     pub notes: Vec<String>,
 }
 
 impl Flight {
-    /// The columns of the CSV format that hold a number in some row, each with its values.
+    /// The columns of the log format that hold a number in some row, each with its values.
     pub fn columns(&self) -> Vec<(&'static str, Vec<f64>)> {
         let column = |c: &(&'static str, Get, Place)| (c.0, self.samples.iter().map(c.1).collect());
         let mut all: Vec<(_, Vec<f64>)> = COLUMNS.iter().map(column).collect();
@@ -131,9 +131,9 @@ impl Flight {
         all
     }
 
-    /// How the rates were sampled, from the log's own column `rate_hold_s`; `None` without the column.
+    /// How the body rates were sampled, from the column `rate_hold_s` of the log; `None` without this column.
     ///
-    /// A simulator that holds its rates for less than half a sample period counts as sampling at instants.
+    /// Rates that are held for less than half a sample period count as sampled at instants.
     pub fn declared_sampling(&self) -> Option<Sampling> {
         let held: Vec<f64> =
             self.samples.iter().map(|s| s.rate_hold_s).filter(|x| x.is_finite()).collect();

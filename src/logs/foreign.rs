@@ -1,8 +1,8 @@
-//! Recognition of files that are not logs, by their first bytes, with advice to the user.
+//! Recognises files that are not readable logs by their first bytes, and advises the user what to do.
 
 use super::format::MAVLINK_MARKERS;
 
-/// First bytes of common files that are not logs, with their kind and the file to give instead.
+/// First bytes of common files that cannot be read, each with a text that names the kind of file and the file to give instead.
 const KNOWN: [(&[u8], &str); 11] = [
     (
         b"#ROSBAG V",
@@ -42,10 +42,10 @@ const KNOWN: [(&[u8], &str); 11] = [
 #[cfg(not(feature = "ros"))]
 pub(super) const BAG_WITHOUT_READER: &str = "it is a ROS 2 bag (MCAP), which this program was built without a reader for: build it with --features study, as `cargo greylag` and the installed program are";
 
-/// A file that begins with this number of zero bytes is not a log.
+/// If at least this number of bytes was read and all are zero, the file is not a log.
 const EMPTY: usize = 256;
 
-/// Kind of the file that begins with `start`, in words; `None` if it is unknown.
+/// Returns a text about the kind of file that begins with `start`. `None` if the kind is unknown.
 pub(super) fn kind(start: &[u8]) -> Option<&'static str> {
     if start.len() >= EMPTY && start.iter().all(|b| *b == 0) {
         return Some("its beginning is all zeros: the copy or the logger did not finish");
@@ -57,14 +57,14 @@ pub(super) fn kind(start: &[u8]) -> Option<&'static str> {
     ))
 }
 
-/// Message about sdlog2, PX4's format before ULog. Its records look like those of a DataFlash log but have another
+/// Message about a log of sdlog2, PX4's format before ULog. Its records look like those of a DataFlash log but have another
 /// meaning.
 pub(super) const SDLOG2: &str = "it is a log of PX4 from before ULog (sdlog2, .px4log), whose records have no times of their own: sdlog2_dump.py of that PX4 makes a CSV of it";
 
-/// Number of successive frames that show a stream.
+/// Number of successive MAVLink frames from which a stream is recognised.
 const IN_A_ROW: usize = 3;
 
-/// Whether MAVLink frames follow one another in `start`, perhaps after the rest of a cut frame.
+/// Whether `start` contains successive MAVLink frames. The rest of a cut frame may precede them.
 fn frames_without_times(start: &[u8]) -> bool {
     let follow = |from: usize| {
         let mut at = from;
@@ -77,7 +77,7 @@ fn frames_without_times(start: &[u8]) -> bool {
     (0..start.len().min(300)).any(follow)
 }
 
-/// Length of the frame at the beginning of `bytes`, from its header; `None` if no frame begins there.
+/// Length of the MAVLink frame at the beginning of `bytes`, computed from its header. `None` if no frame begins there.
 fn frame(bytes: &[u8]) -> Option<usize> {
     let [marker, payload, flags, ..] = bytes else { return None };
     let signature = if flags & 1 == 1 { 13 } else { 0 };

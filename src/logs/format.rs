@@ -1,4 +1,4 @@
-//! The five log formats, distinguished by how they begin.
+//! The five log formats. A file's first bytes tell which format it has.
 
 use serde::Serialize;
 
@@ -16,7 +16,7 @@ pub enum Format {
     Dataflash,
     /// Telemetry log of MAVLink frames (`.tlog`).
     Tlog,
-    /// Bag of ROS 2 in MCAP (`.mcap`).
+    /// Recording of ROS 2 messages ("bag") in the file format MCAP (`.mcap`).
     Ros,
 }
 
@@ -26,11 +26,11 @@ pub(super) const ULOG_MAGIC: [u8; 7] = [0x55, 0x4C, 0x6F, 0x67, 0x01, 0x12, 0x35
 pub(super) const MCAP_MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 /// First bytes of every DataFlash record.
 pub(super) const DATAFLASH_MAGIC: [u8; 2] = [0xA3, 0x95];
-/// Start markers of MAVLink 1 and 2. In a `.tlog`, eight bytes with the time precede each of them.
+/// First byte of a MAVLink 1 frame and of a MAVLink 2 frame. In a `.tlog`, eight bytes with the time precede each frame.
 pub(super) const MAVLINK_MARKERS: [u8; 2] = [0xFE, 0xFD];
 
 impl Format {
-    /// The format of a file by its content; `None` if it is none of the five.
+    /// The format of a file that begins with `bytes`; `None` if it is none of the five.
     pub fn of(bytes: &[u8]) -> Option<Format> {
         if bytes.starts_with(&ULOG_MAGIC) {
             return Some(Format::Ulog);
@@ -41,7 +41,7 @@ impl Format {
         if bytes.starts_with(&DATAFLASH_MAGIC) {
             return Some(Format::Dataflash);
         }
-        // A `.tlog` begins with a big-endian time in µs, whose first byte is zero. No text begins with a zero byte.
+        // a `.tlog` begins with a big-endian time in µs, whose first byte is zero; no text begins with a zero byte
         if bytes.first() == Some(&0) && bytes.get(8).is_some_and(|b| MAVLINK_MARKERS.contains(b)) {
             return Some(Format::Tlog);
         }

@@ -1,4 +1,4 @@
-//! Summary of a log: content, length, and missing channels for each purpose.
+//! Summary of a log: its content, its length, and the channels that it lacks for each purpose, such as a comparison of moments.
 
 use serde::Serialize;
 
@@ -14,43 +14,43 @@ use super::{Channel, Format, Log, Sample, assess};
 /// Summary of a log, as `greylag logs info` prints it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Info {
-    /// Identifier of the schema, `greylag.log-info/1`.
+    /// Name and version of the format, `greylag.log-info/1`.
     pub schema: &'static str,
     /// Name of the flight.
     pub name: String,
     /// Format of the file.
     pub format: Format,
-    /// Number of rows in the table.
+    /// Number of rows in the table that was made from the log.
     pub rows: usize,
-    /// Number of rows that were dropped.
+    /// Number of rows that were dropped as unusable.
     pub dropped_rows: usize,
     /// Time of the first row, s.
     pub from_s: f64,
     /// Time of the last row, s.
     pub to_s: f64,
-    /// Rate of the rows from their median period, Hz.
+    /// Rate of the rows: one over the median time between them, Hz.
     pub rate_hz: f64,
     /// Gaps that split the log: start and length, s.
     pub gaps: Vec<(f64, f64)>,
-    /// Time in flight, s.
+    /// Total time in flight, s.
     pub flight_s: f64,
     /// Phases of flight and ground, in order of time.
     pub phases: Vec<Phase>,
-    /// The vehicle, where the log names it.
+    /// Type of the vehicle; `None` if the log does not show it.
     pub vehicle: Option<Vehicle>,
-    /// Intervals outside wing-borne flight (from, to), s. Their rows are left out.
+    /// Intervals (from, to, s) in which a VTOL is not in wing-borne flight. Their rows are left out.
     pub hovers: Vec<(f64, f64)>,
-    /// Vehicle and boot of this flight, in words; `None` unless the file holds several.
+    /// Text that names the vehicle and the boot of the autopilot of this flight, if the file contains several; otherwise `None`.
     pub life: Option<String>,
-    /// All instances of each topic that has more than one.
+    /// All instances of each topic with more than one instance, such as two airspeed sensors.
     pub sources: Vec<Source>,
-    /// Channels that fill the table.
+    /// Channels of the file that fill columns of the table.
     pub channels: Vec<Channel>,
     /// Purposes with the channels that the log lacks for each.
     pub purposes: Vec<Purpose>,
-    /// Topics of the file: name, instance, number of records.
+    /// Topics (kinds of records) of the file: name, instance, number of records.
     pub topics: Vec<(String, u16, usize)>,
-    /// Findings for the log's user.
+    /// Defects and peculiarities of the log.
     pub findings: Vec<Finding>,
 }
 
@@ -63,12 +63,12 @@ pub struct Purpose {
     pub missing: Vec<String>,
     /// Columns that are present at too low a rate.
     pub slow: Vec<String>,
-    /// Replacements for absent columns.
+    /// Sources from which absent columns are computed.
     pub instead: Vec<String>,
 }
 
 impl Info {
-    /// Field of the log that fills `column`, in the syntax of a mapping file.
+    /// Field of the log that fills `column`, written as in a mapping file, which assigns fields to columns.
     pub fn origin(&self, column: &str) -> String {
         let named = |c: &&Channel| c.columns.iter().any(|own| own == column);
         match (self.format, self.channels.iter().find(named)) {
@@ -77,7 +77,7 @@ impl Info {
         }
     }
 
-    /// Summarises a log.
+    /// The summary of the log `log`.
     pub fn of(log: &Log) -> Info {
         let samples = &log.flight.samples;
         let times: Vec<f64> = samples.iter().map(|s| s.time_s).collect();
@@ -124,7 +124,7 @@ impl Info {
     }
 }
 
-/// Finding about a rudder that moves; `None` if it does not.
+/// The finding that the rudder moves; `None` if it does not.
 fn rudder(log: &Log) -> Option<Finding> {
     let motion = RudderMotion::of(&log.flight.samples)?;
     Some(Finding::warning(format!(
@@ -133,7 +133,8 @@ fn rudder(log: &Log) -> Option<Finding> {
     )))
 }
 
-/// A column counts as present if it fills this fraction of the rows, or of the samples expected at its own rate.
+/// A column counts as present if it has values in this fraction of the rows. For a slow channel, this fraction of the samples
+/// that are expected at its own rate suffices.
 const PRESENT: f64 = 0.5;
 
 /// Number of rows with a value, for each column.
@@ -147,20 +148,21 @@ fn filled(samples: &[Sample]) -> [usize; COLUMNS.len()] {
     counts
 }
 
-/// Whether `column` counts as present. `filled` has the number of rows with a value, for each column.
+/// Whether `column` counts as present in `log`. `filled` has the number of rows with a value, for each column.
 fn has(log: &Log, filled: &[usize; COLUMNS.len()], column: &str) -> bool {
     let samples = &log.flight.samples;
     let whole = samples.first().zip(samples.last()).map_or(0.0, |(a, b)| b.time_s - a.time_s);
     let count = index(column).map_or(0, |place| filled[place]);
     let channel = log.channels.iter().find(|c| c.columns.iter().any(|x| x == column));
     let rate = channel.map_or(f64::INFINITY, |c| c.rate_hz);
-    // Of a long log, only stretches are in memory.
+    // of a long log, only stretches are in memory
     let share = log.stretches.as_ref().map_or(1.0, |s| samples.len() as f64 / s.rows.max(1) as f64);
     let covered = rate > 0.0 && count as f64 >= PRESENT * rate * whole * share;
     count > 0 && (count as f64 >= PRESENT * samples.len() as f64 || covered)
 }
 
-/// Lists the actuators without data, then those whose position is computed from the command by the actuator model.
+/// Two lists. The first names the actuators without data. The second names those without a measured position, whose position is
+/// computed from the command by the actuator model.
 fn actuators(has: impl Fn(&str) -> bool) -> (Vec<String>, Vec<String>) {
     let mut missing = Vec::new();
     let mut instead = Vec::new();
@@ -174,7 +176,7 @@ fn actuators(has: impl Fn(&str) -> bool) -> (Vec<String>, Vec<String>) {
     (missing, instead)
 }
 
-/// Adds obstacles other than absent columns to `purpose`: no wings, no flight, slow channels.
+/// Adds to `purpose` what prevents it other than absent columns: no wings, no flight, or channels that are too slow.
 fn weighed(log: &Log, flight_s: f64, mut purpose: Purpose) -> Purpose {
     let wings = log.vehicle.as_ref().is_none_or(|v| v.refusal().is_none());
     if !wings {
@@ -200,7 +202,7 @@ fn weighed(log: &Log, flight_s: f64, mut purpose: Purpose) -> Purpose {
     purpose
 }
 
-/// Source of the air density that replaces a logged one; empty if the log has its own.
+/// Source of the air density if the log has none; empty if the log has it.
 fn density(has: impl Fn(&str) -> bool) -> Vec<String> {
     match (has("air_density_kgpm3"), has("altitude_m")) {
         (true, _) => Vec::new(),
@@ -211,7 +213,7 @@ fn density(has: impl Fn(&str) -> bool) -> Vec<String> {
     }
 }
 
-/// Name of the purpose for which slow channels suffice.
+/// Name of the purpose for which channels of any rate suffice.
 const INCIDENCE: &str = "alpha, beta";
 
 fn purposes(log: &Log) -> Vec<Purpose> {

@@ -1,8 +1,8 @@
-//! Delay of velocity and airspeed relative to the inertial sensors, by cross-correlation.
+//! Estimates by how much the recorded velocity and airspeed lag behind the inertial sensors, by cross-correlation.
 //!
 //! The rate of change of the ground velocity equals the specific force in earth axes plus gravity. The rate of change
-//! of the airspeed is about the acceleration along the body x axis. The delay is the shift with the highest
-//! correlation.
+//! of the airspeed is about the acceleration along the body x axis. The delay is the time shift with the highest
+//! correlation between the two sides. A delay that matters becomes a finding, a message to the user.
 
 use nalgebra::{Rotation3, Vector3};
 
@@ -15,21 +15,21 @@ use greylag_physics::atmosphere::STANDARD_GRAVITY;
 const STEP_S: f64 = 0.05;
 /// Largest shift that is tried, s.
 const SHIFT_S: f64 = 3.0;
-/// Time span over which changes are computed, s.
+/// Time span over which changes of velocity and airspeed are computed, s.
 const OVER_S: f64 = 0.6;
-/// Shortest stretch that is evaluated, s.
+/// Shortest stretch of a log that is evaluated, s.
 const SHORTEST_S: f64 = 12.0;
-/// Longest stretch that is evaluated, s: longer ones add no accuracy.
+/// Longest stretch of a log that is evaluated, s. A longer one adds no accuracy.
 const LONGEST_S: f64 = 300.0;
-/// Correlation above which a delay is taken as certain, and its smallest excess over the correlation without a shift.
+/// A delay counts as certain if its correlation exceeds `CERTAIN` and exceeds the correlation without a shift by `BETTER`.
 const CERTAIN: f64 = 0.7;
 const BETTER: f64 = 0.15;
 /// Smallest delay that is reported, s.
 const NAMED_S: f64 = 0.25;
-/// Delay above which the results of a study are wrong, s.
+/// Smallest delay that is reported as a problem, because results from the log would be wrong, s.
 const WRONG_S: f64 = 0.6;
 
-/// Findings on the delays that are large enough to be reported.
+/// Returns a finding for each delay that is large enough to be reported.
 pub(super) fn check(rows: &[Sample]) -> Vec<Finding> {
     let Some(grid) = Grid::of(rows) else { return Vec::new() };
     let forces: Vec<Vector3<f64>> = grid.forces();
@@ -59,7 +59,7 @@ fn said(what: &str, key: &str, delay_s: f64) -> Option<Finding> {
     }
 }
 
-/// The longest stretch of a log without gaps, and evenly spaced times for its resampling.
+/// The longest stretch without gaps in the first 15 min of a log, and evenly spaced times for its resampling.
 struct Grid<'a> {
     rows: Vec<&'a Sample>,
     times: Vec<f64>,
@@ -93,12 +93,12 @@ impl<'a> Grid<'a> {
         (length >= SHORTEST_S).then(|| Grid { rows: rows[best].to_vec(), times })
     }
 
-    /// A column resampled to the even times; `None` if it is too slow or absent.
+    /// A column, resampled to the even times; `None` if it has fewer than two values per second.
     fn series(&self, get: impl Fn(&Sample) -> f64) -> Option<Vec<f64>> {
         self.at_even_times(self.rows.iter().copied().map(get))
     }
 
-    /// The `values` of the rows resampled to the even times; `None` if they are too slow or absent.
+    /// The `values` of the rows, resampled to the even times; `None` if there are fewer than two values per second.
     fn at_even_times(&self, values: impl Iterator<Item = f64>) -> Option<Vec<f64>> {
         let pairs = self.rows.iter().map(|s| s.time_s).zip(values);
         let own: Vec<(f64, f64)> = pairs.filter(|(_, x)| x.is_finite()).collect();
@@ -122,7 +122,7 @@ impl<'a> Grid<'a> {
         n.iter().zip(&e).zip(&d).map(|((n, e), d)| Vector3::new(*n, *e, *d)).collect()
     }
 
-    /// Acceleration along the body x axis at the even times, m/s².
+    /// Acceleration along the body x axis at the even times, m/s²: specific force plus gravity.
     fn along(&self) -> Vec<f64> {
         let along =
             |s: &Sample| s.specific_force_mps2[0] - STANDARD_GRAVITY * s.attitude_rad[1].sin();
@@ -137,8 +137,9 @@ fn earth(s: &Sample) -> Vector3<f64> {
         + Vector3::new(0.0, 0.0, STANDARD_GRAVITY)
 }
 
-/// The delay of the first series of each pair, s: the shift at which its change matches the second series best.
-/// `None` if no shift is significant.
+/// The common delay of the first series of all pairs, s. Each pair is a velocity and the acceleration that belongs to it. At
+/// the delay, the changes of the velocities correlate best with the integrals of the accelerations. `None` if no delay is
+/// certain.
 fn delay(pairs: &[(Vec<f64>, Vec<f64>)]) -> Option<f64> {
     let over = (OVER_S / STEP_S) as usize;
     let (mut changes, mut expected): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
@@ -172,7 +173,7 @@ fn centred(values: Vec<f64>) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Level flight north with an oscillating speed. The velocity over ground is `late` s late.
+    /// Level flight to the north with an oscillating speed. The recorded velocity over ground is delayed by `late` s.
     fn rows(late: f64) -> Vec<Sample> {
         let speed = |t: f64| 15.0 + (0.9 * t).sin() + 0.7 * (2.3 * t + 1.0).sin();
         let force = |t: f64| 0.9 * (0.9 * t).cos() + 0.7 * 2.3 * (2.3 * t + 1.0).cos();

@@ -1,7 +1,6 @@
-//! Flight logs: readers and writers of the file formats, and a flight in memory.
+//! Flight logs: readers and writers of the file formats, and the table that holds a flight in memory.
 //!
-//! [`load`] recognises one of the five formats by the first bytes of the file and resamples the channels onto one
-//! table.
+//! [`load`] recognises the format of a file by its first bytes and resamples the recorded channels to common times.
 
 mod assess;
 mod binary;

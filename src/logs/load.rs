@@ -1,4 +1,7 @@
 //! Reads a log file of any format into one table.
+//!
+//! A finding is a defect or peculiarity of the log that its user is told. A mapping states which field of the file fills which
+//! column.
 
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -21,16 +24,16 @@ use super::topics::Topics;
 use super::vehicle::Vehicle;
 use super::{Flight, binary, dataflash, text, tlog, ulog};
 
-/// How a log is read.
+/// Options for reading a log.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// How many unusable rows a log may have.
+    /// Number of unusable rows that is tolerated.
     pub tolerance: Tolerance,
-    /// The user's mapping. Its sources of columns replace those built in for the format.
+    /// The user's mapping. Its sources of columns replace those that are built in for the format.
     pub mapping: Mapping,
     /// Criteria by which rows count as flight.
     pub flies: Flying,
-    /// Topic instances that the user chose in place of the reader's choice.
+    /// Topic instances that the user requested instead of those that the reader would choose.
     pub sources: Vec<Asked>,
 }
 
@@ -60,7 +63,7 @@ pub struct Log {
     pub flight: Flight,
     /// Channels of the file that fill the table.
     pub channels: Vec<Channel>,
-    /// Topics of the file (name, instance, records), used or not.
+    /// All topics of the file, used or not: name, instance and number of records.
     pub topics: Vec<(String, u16, usize)>,
     /// Number of rows dropped because they are out of order, repeated, incomplete or impossible.
     pub dropped: usize,
@@ -71,15 +74,16 @@ pub struct Log {
     pub findings: Vec<Finding>,
     /// Criteria for flight that were applied.
     pub flies: Flying,
-    /// The vehicle, where the log names it.
+    /// The vehicle; `None` if the log does not name it.
     pub vehicle: Option<Vehicle>,
-    /// Intervals outside wing-borne flight (from, to), s. Their rows are left out.
+    /// Intervals (from, to), s, in which the aircraft is not flying on its wing, such as the hover of a VTOL. Their rows are
+    /// left out.
     pub hovers: Vec<(f64, f64)>,
     /// All instances of each topic that has more than one.
     pub sources: Vec<Source>,
-    /// Vehicle and boot of this flight, in words; `None` unless the file holds several.
+    /// Vehicle and boot of this flight, in words; `None` if the file holds only one flight.
     pub life: Option<String>,
-    /// Statistics of the whole log, if only stretches of its rows are kept (inspection of a long log).
+    /// Statistics of the whole log, if only parts of a long log are kept in memory for an inspection.
     pub stretches: Option<Stretches>,
 }
 
@@ -91,7 +95,7 @@ impl Log {
         (!lines.is_empty()).then(|| lines.join("; "))
     }
 
-    /// Phases of flight and ground, in order of time.
+    /// Phases on the ground and in flight, in order of time.
     pub fn phases(&self) -> Vec<Phase> {
         match &self.stretches {
             Some(stretches) => stretches.phases.clone(),
@@ -118,7 +122,7 @@ pub(super) enum Use {
 /// If the file holds several flights, the longest is returned.
 ///
 /// # Errors
-/// The file cannot be read, or is not a log.
+/// If the file cannot be read, or is not a log.
 pub fn inspect(path: &Path, options: &Options) -> Result<Log, LogError> {
     longest(open(path, options, Use::Look)?)
 }
@@ -126,7 +130,7 @@ pub fn inspect(path: &Path, options: &Options) -> Result<Log, LogError> {
 /// Reads all flights of a log for inspection: one for each boot of each vehicle in it.
 ///
 /// # Errors
-/// As [`inspect`].
+/// The same as [`inspect`].
 pub fn inspect_all(path: &Path, options: &Options) -> Result<Vec<Log>, LogError> {
     open(path, options, Use::Look)?.into_iter().collect()
 }
@@ -135,16 +139,16 @@ pub fn inspect_all(path: &Path, options: &Options) -> Result<Vec<Log>, LogError>
 /// selects the second one.
 ///
 /// # Errors
-/// The file cannot be read, is not a log, lacks a required column, or has too many unusable rows.
+/// If the file cannot be read, is not a log, lacks a required column, or has too many unusable rows.
 pub fn load(path: &Path, options: &Options) -> Result<Log, LogError> {
     longest(open(path, options, Use::Compute)?)
 }
 
-/// Reads all flights of a log, one for each boot of each vehicle in it. Boots without time in flight are left out if
-/// another boot has some; a finding of the first flight lists them.
+/// Reads all flights of a log, one for each boot of each vehicle in it. Boots without time in flight are left out if another
+/// boot has time in flight. A finding of the first flight lists them.
 ///
 /// # Errors
-/// As [`load`], if none of them can be read.
+/// The same as [`load`], if none of the flights can be read.
 pub fn flights(path: &Path, options: &Options) -> Result<Vec<Log>, LogError> {
     let mut all = open(path, options, Use::Compute)?;
     if all.len() < 2 {
@@ -166,7 +170,7 @@ pub fn flights(path: &Path, options: &Options) -> Result<Vec<Log>, LogError> {
 /// Reads a log from bytes; `path` appears in errors and as the name of the flight.
 ///
 /// # Errors
-/// As [`load`].
+/// The same as [`load`].
 pub fn parse(bytes: &[u8], path: &Path, options: &Options) -> Result<Log, LogError> {
     let start = &bytes[..bytes.len().min(door::LOOK)];
     longest(read(start, &mut &bytes[..], path, options, Use::Compute)?)
@@ -183,8 +187,8 @@ fn said_of(log: &Result<Log, LogError>) -> String {
     }
 }
 
-/// Returns the log with the longest time in flight, with a finding that lists the others. If no log can be read,
-/// returns the first error.
+/// Returns the log with the longest time in flight. A finding of this log lists the others. If no log can be read, returns the
+/// first error.
 fn longest(mut all: Vec<Result<Log, LogError>>) -> Result<Log, LogError> {
     if all.len() == 1 {
         return all.swap_remove(0);
@@ -244,7 +248,7 @@ fn read(
         let what = foreign::kind(start).unwrap_or(NONE_OF_THEM);
         return Err(LogError::Foreign { path: path.to_owned(), what });
     };
-    // Columns that are derived from others need every row.
+    // columns that are computed from other columns need every row
     let keep = match to {
         Use::Look if !options.mapping.derives() => Keep::Stretches,
         _ => Keep::All,
@@ -340,8 +344,8 @@ pub(super) fn name(path: &Path) -> String {
     path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// Text on units that are probably wrong, for the error about unusable rows. It consists of the findings of
-/// `screening` whose text contains "look" ("looks like degrees"). Such a text must therefore keep that word.
+/// Text on units that are probably wrong, for the error about unusable rows. It consists of the findings whose text contains
+/// "look", such as "looks like degrees". The texts of `screening` must therefore keep this word.
 pub(super) fn hint(findings: &[Finding]) -> String {
     findings.iter().filter(|f| f.text.contains("look")).map(|f| format!("; {}", f.text)).collect()
 }

@@ -1,4 +1,5 @@
-//! Columns of the log format computed from the columns of named surfaces and motors.
+//! Computes the deflections and commands of aileron, elevator, rudder and throttle from columns of the individual surfaces
+//! and motors of an airframe. Each is a weighted sum; the airframe's mixer holds the weights.
 
 use super::columns::{COLUMNS, Place, index};
 use super::mapping::Mapping;

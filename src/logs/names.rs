@@ -1,8 +1,8 @@
-//! Names that distinguish the flights of several logs.
+//! Names for the flights of several logs, such that no two flights have the same name.
 
 use std::path::Path;
 
-/// Names of the flights of these logs: the file name, or the full path where two logs have the same file name.
+/// A name for the flight of each log: its file name, or its path as given if another log has the same file name.
 pub fn names<P: AsRef<Path>>(logs: &[P]) -> Vec<String> {
     let short = |path: &P| {
         let path = path.as_ref();

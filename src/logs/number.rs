@@ -1,6 +1,6 @@
-//! Numbers in the binary messages of ULog and of ROS.
+//! Types of the numbers in the binary messages of ULog and of ROS.
 
-/// Type of a number.
+/// Type of a number in a message.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Number {
     I8,
@@ -33,7 +33,7 @@ impl Number {
         })
     }
 
-    /// Size, bytes.
+    /// Size of a number of this type, bytes.
     pub(crate) fn size(self) -> usize {
         match self {
             Number::I8 | Number::U8 => 1,
@@ -43,7 +43,7 @@ impl Number {
         }
     }
 
-    /// The little-endian value at `offset`; NaN beyond the end of `bytes`.
+    /// The little-endian value at `offset` (bytes); NaN if it extends beyond the end of `bytes`.
     pub(crate) fn at(self, bytes: &[u8], offset: usize) -> f64 {
         fn take<const N: usize>(bytes: &[u8], offset: usize) -> Option<[u8; N]> {
             bytes.get(offset..)?.first_chunk().copied()

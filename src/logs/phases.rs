@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::Sample;
 
-/// Criteria for flight in a log, and the flight time that a study needs.
+/// States when the aircraft counts as flying, and how much flight time a study of the log needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flying {
     /// Airspeed above which the aircraft counts as flying, m/s.
@@ -42,7 +42,7 @@ impl Flying {
     }
 }
 
-/// A time between rows above this, s, splits a log. If three sample periods are longer, they apply instead.
+/// A log is split where the time between two rows exceeds this limit (s) and three sample periods.
 const GAP_S: f64 = 0.1;
 
 /// Kind of a phase.
@@ -98,7 +98,7 @@ pub fn phases(rows: &[Sample], flies: &Flying) -> Vec<Phase> {
             _ => raw.push(Phase { kind, from_s: row.time_s, to_s: row.time_s, rows: 1 }),
         }
     }
-    // A phase shorter than `sustained_s` is merged with the preceding one.
+    // A phase shorter than `sustained_s` is merged with the preceding one. At the start or after a gap it counts as ground.
     let mut out: Vec<Phase> = Vec::new();
     for mut phase in raw {
         let short = phase.to_s - phase.from_s < flies.sustained_s;

@@ -1,8 +1,8 @@
-//! Quality of a channel's samples: rate of new values, interpolated values, frozen values.
+//! Quality of a channel's samples: rate of new values, interpolated values, frozen values, spikes.
 //!
-//! A table that was resampled to one clock has a value in every row. Between the samples of a slow sensor, values
-//! were interpolated on a straight line or held. Interpolated values have zero second differences, held values have
-//! zero first differences. Such rows are not measurements.
+//! A table that was resampled to one clock has a value in every row. Between the samples of a slow sensor, the values were
+//! interpolated on a straight line or held. Such values are not measurements. Second differences are zero on a straight line,
+//! first differences are zero while a value is held. A kink is a sample at which two straight lines meet.
 
 use serde::Serialize;
 
@@ -12,13 +12,13 @@ use greylag_num::statistics::quantile;
 /// Quality of the samples of a channel.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Quality {
-    /// Rate of new values, Hz; 0 if too little changes for an estimate.
+    /// Rate of new values, Hz; 0 if the values change too rarely for an estimate.
     pub native_hz: f64,
     /// Whether most samples lie on straight lines between other samples.
     pub interpolated: bool,
     /// Decimal step to which the values are rounded, in the column's unit; 0 if there is none.
     pub quantum: f64,
-    /// Intervals in which one value stays for much longer than usual: from, to, s.
+    /// Intervals (from, to), s, in which the value stays constant for much longer than usual.
     pub frozen: Vec<(f64, f64)>,
     /// Number of spikes: short excursions far beyond the neighbouring samples.
     pub spikes: usize,
@@ -28,25 +28,25 @@ pub struct Quality {
 
 /// Smallest number of samples for an assessment.
 const ENOUGH: usize = 100;
-/// Values count as interpolated if more than this share of the changing ones lies on straight lines.
+/// Values count as interpolated if more than this fraction of the changing values lies on straight lines.
 const STRAIGHT: f64 = 0.7;
-/// Smallest median size of the kinks between straight lines, in multiples of the rounding error.
+/// Smallest median second difference at a kink, in multiples of the rounding error.
 const KINK: f64 = 10.0;
 /// Smallest median distance between kinks, samples.
 const APART: f64 = 3.0;
-/// A constant value is frozen if it lasts longer than both limits: a time in s, and a number of usual times between
+/// A constant value counts as frozen if it lasts longer than both limits: a time in s, and a multiple of the usual time between
 /// changes.
 pub(super) const FROZEN_S: f64 = 0.5;
 const FROZEN_STEPS: f64 = 20.0;
-/// Number of samples on each side that form the median with which a spike is compared.
+/// Number of samples on each side of a spike from which the median is computed.
 const AROUND: usize = 4;
-/// Smallest deviation of a spike from that median: in robust standard deviations, and relative to the median
+/// Smallest deviation of a spike from that median: in robust standard deviations, and as a fraction of the channel's median
 /// magnitude.
 const FAR_SD: f64 = 10.0;
 const FAR_PART: f64 = 0.4;
 
 impl Quality {
-    /// The quality of a column's samples at increasing times (s), all finite.
+    /// The quality of a column's samples `values` at increasing `times` (s). All are finite.
     pub fn of(column: &str, times: &[f64], values: &[f64]) -> Quality {
         Quality::at(column, times, values, period_s(times))
     }
@@ -77,7 +77,7 @@ impl Quality {
     }
 }
 
-/// The column in which spikes are looked for. Water in the pitot tube or a loose hose causes them.
+/// The column in which spikes are sought. Water in the pitot tube or a loose hose causes them.
 const SPIKY: &str = "airspeed_mps";
 
 /// Whether a column comes from a sensor whose value never stays constant in flight.
@@ -98,7 +98,7 @@ fn quantum(values: &[f64]) -> f64 {
     (0..=9).find(whole).map_or(0.0, |k| 10f64.powi(-k))
 }
 
-/// Rate of the kinks, Hz, if the values are linear between them; `None` for other channels.
+/// Rate of the kinks, Hz, if the values lie on straight lines between kinks; otherwise `None`.
 fn kinks(times: &[f64], values: &[f64], period: f64, quantum: f64) -> Option<f64> {
     let span = |f: fn(f64, f64) -> f64| values.iter().copied().reduce(f).unwrap_or(0.0);
     let range = span(f64::max) - span(f64::min);
@@ -122,8 +122,8 @@ fn kinks(times: &[f64], values: &[f64], period: f64, quantum: f64) -> Option<f64
     let gaps: Vec<f64> = bent.windows(2).map(|w| (w[1].0 - w[0].0) as f64).collect();
     let lines = 2 * moving >= ENOUGH && straight as f64 > STRAIGHT * moving as f64;
     let sharp = quantile(&sizes, 0.5) > KINK * rounding;
-    // A single kink, such as that of a held command, does not show interpolation. Several kinks with straight lines
-    // between them do.
+    // A single kink, such as that of a held command, does not show interpolation. Several kinks with straight lines between
+    // them show it.
     let apart = bent.len() >= 2 && quantile(&gaps, 0.5) >= APART;
     (lines && sharp && apart).then(|| 1.0 / (quantile(&gaps, 0.5) * period))
 }
@@ -137,8 +137,8 @@ fn steps(times: &[f64]) -> Vec<f64> {
     times.windows(2).map(|w| w[1] - w[0]).collect()
 }
 
-/// Selects from the intervals of constant value, `stays` (from, to, s), those that count as frozen for a channel with
-/// `values` at `times` (s).
+/// Selects the intervals that count as frozen from `stays`, the intervals (from, to), s, of constant value. `values` at `times`
+/// (s) give the usual time between changes.
 pub(super) fn frozen_of(
     column: &str,
     times: &[f64],
@@ -160,7 +160,7 @@ fn frozen_s(changes: &[f64]) -> Option<f64> {
     enough.then(|| FROZEN_S.max(FROZEN_STEPS * usual))
 }
 
-/// Intervals (from, to, s) in which one nonzero value stays for much longer than usual.
+/// Intervals (from, to), s, in which a nonzero value stays constant for much longer than usual.
 fn frozen(times: &[f64], values: &[f64], changes: &[f64]) -> Vec<(f64, f64)> {
     let Some(limit) = frozen_s(changes) else { return Vec::new() };
     let mut out = Vec::new();
@@ -198,7 +198,7 @@ fn spikes(values: &[f64]) -> (usize, f64) {
 mod tests {
     use super::*;
 
-    /// Deterministic noise for sample `i`, which is not rounded.
+    /// Deterministic noise of sample `i` with all digits of a float.
     fn noise(i: usize) -> f64 {
         ((i as f64 * 12.9898).sin() * 43758.5453).fract()
     }
@@ -213,7 +213,7 @@ mod tests {
 
     #[test]
     fn lines_between_slow_samples_are_found_with_the_rate_of_the_samples() {
-        // A sample every 0.25 s, with straight lines between them, rounded to five decimals.
+        // a sample every 0.25 s, with straight lines between them, rounded to five decimals
         let line = |i: usize| {
             let (k, f) = (i / 25, (i % 25) as f64 / 25.0);
             rounded(noise(k) * (1.0 - f) + noise(k + 1) * f)

@@ -1,4 +1,4 @@
-//! Reads a channel at any time: interpolates or holds its samples, and unwraps its angles.
+//! Resamples recorded signals at the times of the table's rows: a value is interpolated or held, and angles are unwrapped.
 
 use std::borrow::Cow;
 use std::cell::Cell;
@@ -8,28 +8,29 @@ use super::Sample;
 use super::columns::{COLUMNS, Place, index, is_held, is_wrapped};
 use super::mapping::rule::{Fill, Rule};
 
-/// Two times this close are the same, s: logs count microseconds or milliseconds.
+/// Two times count as equal if they differ by at most this, s. Logs count in microseconds or milliseconds.
 pub(super) const SAME_S: f64 = 1e-6;
 
-/// The samples of a track, prepared for reading at any time.
+/// The samples of a signal, prepared for reading at any time.
 pub(super) struct Reader<'a> {
     times: &'a [f64],
     series: Cow<'a, [Vec<f64>]>,
-    /// The longest time between two samples that is bridged, s.
+    /// Longest time for which a value is held, and longest time between two samples that are interpolated, s.
     limit: f64,
     to: Target,
     /// Index in `times` at which the search for the next row begins.
     last: Cell<usize>,
 }
 
-/// The columns that a track fills.
+/// The columns that a signal fills.
 enum Target {
     Attitude,
     Column { place: Place, held: bool, wraps: bool },
 }
 
 impl<'a> Reader<'a> {
-    /// Prepares the samples of `rule`. `limit` is the longest time (s) for which a value is carried over.
+    /// Prepares the samples of the signal that `rule` describes. `limit` is the longest time (s) for which a value is held or
+    /// interpolated.
     pub(super) fn new(
         rule: &Rule,
         times: &'a [f64],
@@ -55,7 +56,7 @@ impl<'a> Reader<'a> {
         Some(Reader { times, series, limit, to, last: Cell::new(0) })
     }
 
-    /// Fills the row's columns at the row's time.
+    /// Fills the columns of `row` with the values at the row's time.
     pub(super) fn put(&self, row: &mut Sample) {
         let (times, limit) = (self.times, self.limit);
         let at = At::near(row.time_s, times, self.last.get());
@@ -89,7 +90,7 @@ fn one_sided(q: &mut [Vec<f64>]) {
     }
 }
 
-/// Roll, pitch and yaw (rad) of a quaternion, w first; `None` if its norm is far from one.
+/// Roll, pitch and yaw (rad) of a quaternion, w first. `None` if its norm is not between 0.5 and 2.
 fn euler([w, x, y, z]: [f64; 4]) -> Option<[f64; 3]> {
     let n = (w * w + x * x + y * y + z * z).sqrt();
     if !(n > 0.5 && n < 2.0) {
@@ -103,7 +104,7 @@ fn euler([w, x, y, z]: [f64; 4]) -> Option<[f64; 3]> {
     ])
 }
 
-/// Number of samples that are tried in turn before a binary search.
+/// Number of samples that are searched one by one before a binary search.
 const STEPS: usize = 8;
 
 /// Position of a time among a channel's times.
@@ -115,7 +116,7 @@ struct At {
 }
 
 impl At {
-    /// Finds `t` among `times`. The search begins at the index `place`, because rows mostly come in order of time.
+    /// Finds `t` among `times`. The search begins at the index `place`, because successive rows usually have increasing times.
     fn near(t: f64, times: &[f64], place: usize) -> At {
         let passed = |x: &f64| *x <= t + SAME_S;
         let ahead = times.get(place..).unwrap_or_default();
@@ -146,15 +147,15 @@ impl At {
     }
 }
 
-/// Largest magnitude of an angle in radians: 2π for a heading, π for a roll angle.
+/// Largest magnitude of an undamaged angle, rad: 2π for the yaw angle, π for others, with a tolerance for rounding.
 fn largest(column: &str) -> f64 {
     (if column == "yaw_rad" { TAU } else { PI }) + 1e-3
 }
 
-/// Largest share of damaged samples in a column that is still taken as an angle.
+/// Largest fraction of values beyond this magnitude in a column that is still taken as an angle in radians.
 const DAMAGED: f64 = 0.01;
 
-/// Whether a series can be in radians. Wrapping a series in degrees would hide its wrong unit.
+/// Whether the values of a series can be angles in radians. If a series in degrees were wrapped, its wrong unit would be hidden.
 fn is_angle(series: &[f64], column: &str) -> bool {
     let limit = largest(column);
     let beyond = series.iter().filter(|x| !is_within(**x, limit)).count();
@@ -165,7 +166,7 @@ fn is_within(angle: f64, limit: f64) -> bool {
     angle.abs() <= limit
 }
 
-/// Removes the jumps of 2π from `angles`. An angle larger than `limit` is damaged and becomes NaN.
+/// Removes the jumps of 2π from `angles`. An angle of larger magnitude than `limit` is damaged and becomes NaN.
 fn unwrap(angles: &mut [f64], limit: f64) {
     let mut last: Option<f64> = None;
     for angle in angles {

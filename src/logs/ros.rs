@@ -1,14 +1,17 @@
-//! Reads ROS 2 bags in MCAP into topics: those of MAVROS and `px4_msgs`, and any other that a mapping names.
+//! Reads ROS 2 recordings ("bags") in MCAP files into topics: those of MAVROS and `px4_msgs`, and any other that a mapping file
+//! names.
 //!
-//! Chunks are unpacked while they are read. Only requested messages are kept. Reading resumes after damage.
+//! An MCAP file consists of records: definitions of message types, channels (topics with their type), messages, and chunks,
+//! which contain compressed records. Chunks are unpacked while they are read. Only requested messages are kept. After a damaged
+//! place, reading resumes at the next chunk or message.
 //!
-//! The time of a message is its stamp: `timestamp_sample` or `timestamp` of `px4_msgs`, `header.stamp` of others. A
-//! message without a stamp has the recorder's time, converted to the clock of the stamps. Stamps may jump relative to
-//! the recorder's time, as PX4's do at time synchronisation. A jump of more than [`JUMP_S`] is removed by means of
-//! the recorder's time.
+//! The time of a message is the timestamp ("stamp") that it contains: `timestamp_sample` or `timestamp` of `px4_msgs`,
+//! `header.stamp` of others. A message without a stamp gets the recorder's time, converted to the clock of the stamps. Stamps
+//! may jump relative to the recorder's time, as PX4's do at time synchronisation. A jump of more than [`JUMP_S`] is removed by
+//! means of the recorder's time.
 //!
-//! Topics of `px4_msgs` have the names and fields of ULog (`/fmu/out/vehicle_status_v1` is `vehicle_status`). The
-//! name of a MAVROS topic is the part after `/mavros/`. Other topics keep their name without the first slash.
+//! Topics of `px4_msgs` get the names and fields of ULog (`/fmu/out/vehicle_status_v1` becomes `vehicle_status`). The name of a
+//! MAVROS topic is the part after `/mavros/`. Other topics keep their names without the first slash.
 //!
 //! Not read: definitions in `ros2idl`, messages in encodings other than CDR, bags of several files.
 
@@ -35,38 +38,38 @@ use streams::Streams;
 const HEAD: usize = 9;
 /// Size of a message's header (channel, sequence number and two times), bytes.
 const MESSAGE: usize = 22;
-/// The longest message or definition that is read, bytes; longer messages are only counted.
+/// The longest message or definition that is read, bytes. Longer messages are only counted.
 const LONGEST: u64 = 1 << 20;
-/// Number of bytes by which a record is distinguished from damage.
+/// Number of bytes from which it is decided whether a record begins at a place or the file is damaged there.
 const LOOK: usize = 4096;
-/// Jump of the stamps relative to the recorder's time above which it is removed, s.
+/// Largest jump of the stamps relative to the recorder's time that is kept, s.
 const JUMP_S: f64 = 5.0;
 
 struct Reader<'w> {
     streams: Streams<'w>,
     /// The bytes of the present record.
     buffer: Vec<u8>,
-    /// Whether the last bytes were a valid record.
+    /// Whether a valid record ends at the present place of the file.
     in_step: bool,
     /// Number of bytes that belong to no record.
     skipped: usize,
-    /// Seconds lost at each damaged place; NaN until the next message.
+    /// Time between the last message before and the first one after each damaged place, s. NaN until the latter is read.
     holes: Vec<f64>,
     /// The recorder's time of the last message, ns since 1970.
     last_ns: Option<u64>,
     chunks: usize,
-    /// Number of chunks that could not be read to their end, and why the first could not.
+    /// Number of chunks that could not be read to their end, and the reason for the first.
     broken: usize,
     reason: String,
     /// Number of chunks with a wrong checksum.
     unequal: usize,
     /// Number of bytes that are missing from the last record.
     lacking: u64,
-    /// Whether an end record of the file was read.
+    /// Whether a record that marks the end of the data or of the file was read.
     ended: bool,
 }
 
-/// Reads the fields for which `wanted(topic, field)` is true. Messages of all other topics are counted.
+/// Reads the fields for which `wanted(topic, field)` is true. The messages of all topics are counted.
 pub(super) fn read<'a>(
     source: &'a mut dyn Read,
     wanted: &dyn Fn(&str, &str) -> bool,
@@ -108,14 +111,14 @@ pub(super) fn read<'a>(
 }
 
 impl Reader<'_> {
-    /// Code and length of the record at the beginning of `view`; `None` if it cannot be one.
+    /// Code and length of the record at the beginning of `view`; `None` if no record can begin there.
     ///
-    /// Chunks and their indices state their length twice, and both values must agree. After damage, reading resumes
-    /// only at a chunk or at a message on a known channel.
+    /// Chunks and their indices state their length twice, and both values must agree. After a damaged place, only a chunk or a
+    /// message on a known channel is accepted as the next record.
     fn head(&self, view: &[u8]) -> Option<(u8, u64)> {
         let (code, length) = (*view.first()?, u64::from_le_bytes(bytes(view, 1)?));
         let body = &view[HEAD..];
-        // A record that is cut off by the end of the file is judged by its first bytes.
+        // if the end of the file cuts a record off, only its existing bytes are checked
         let agrees = match code {
             op::CHUNK => chunk::agrees(body, length),
             op::MESSAGE_INDEX => {
@@ -133,7 +136,7 @@ impl Reader<'_> {
         (agrees && sure && length < 1 << 48).then_some((code, length))
     }
 
-    /// Reads the record at the beginning of the window.
+    /// Reads the record at the beginning of `window`.
     fn place(&mut self, window: &mut Window<'_>, code: u8, length: u64) {
         self.in_step = true;
         self.ended |= matches!(code, op::DATA_END | op::FOOTER);
@@ -142,13 +145,13 @@ impl Reader<'_> {
         if code == op::CHUNK {
             self.chunk(&mut body);
         } else {
-            // Missing bytes are counted below.
+            // the error is not needed, because missing bytes are counted below
             let _ = self.record(code, length, &mut body);
         }
         self.lacking += body.finish();
     }
 
-    /// Counts a byte that belongs to no record.
+    /// Skips and counts a byte that belongs to no record.
     fn damaged(&mut self, window: &mut Window<'_>) {
         self.hole();
         self.in_step = false;
@@ -156,7 +159,7 @@ impl Reader<'_> {
         window.skip(1);
     }
 
-    /// Records a loss of messages. Its duration follows from the time of the next message.
+    /// Notes the start of a damaged place. The time that is lost there follows from the next message.
     fn hole(&mut self) {
         if self.in_step {
             self.holes.push(f64::NAN);
@@ -176,10 +179,10 @@ impl Reader<'_> {
         }
     }
 
-    /// Reads a record of `length` bytes from `from`.
+    /// Reads a record with this code and `length` bytes from `from`.
     ///
     /// # Errors
-    /// `from` ends within the record, or cannot be read.
+    /// If `from` ends within the record, or cannot be read.
     fn record(&mut self, code: u8, length: u64, from: &mut dyn Read) -> io::Result<()> {
         self.buffer.clear();
         match code {
@@ -210,13 +213,14 @@ impl Reader<'_> {
         }
     }
 
-    /// Appends `length` bytes of `from` to the buffer. The buffer grows only with the bytes that exist.
+    /// Appends `length` bytes of `from` to the buffer. Memory is allocated only for bytes that exist.
     fn fill(&mut self, length: u64, from: &mut dyn Read) -> io::Result<()> {
         let read = from.take(length).read_to_end(&mut self.buffer)?;
         if read as u64 == length { Ok(()) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
     }
 
-    /// Records the recorder's time of a message, ns since 1970. It ends a loss of messages.
+    /// Notes the recorder's time of a message, ns since 1970. If a damaged place precedes the message, the time that was lost
+    /// there is now known.
     fn passed(&mut self, log_ns: u64) {
         if let Some(hole) = self.holes.last_mut().filter(|hole| hole.is_nan()) {
             let last = self.last_ns.unwrap_or(log_ns);
@@ -267,7 +271,7 @@ impl Reader<'_> {
     }
 }
 
-/// Skips `length` bytes.
+/// Skips `length` bytes of `from`.
 fn pass(length: u64, from: &mut dyn Read) -> io::Result<()> {
     let passed = io::copy(&mut from.take(length), &mut io::sink())?;
     if passed == length { Ok(()) } else { Err(io::ErrorKind::UnexpectedEof.into()) }

@@ -1,17 +1,17 @@
-//! Separates the usable rows of a table from the others, and counts why those are unusable.
+//! Separates the usable rows of a log's table from the unusable ones, and counts the unusable ones by reason.
 
 use super::Sample;
 use super::columns::{COLUMNS, NEEDED, index};
 
 /// Share of unusable rows above which a log is refused.
 const REFUSED_SHARE: f64 = 0.05;
-/// Most negative true airspeed that noise about zero explains in a pitot tube at rest, m/s.
+/// Airspeeds from this value up to zero are noise of a pitot tube at rest, m/s.
 const PITOT_AT_REST: f64 = -5.0;
-/// A column with values in less than this share of the rows is taken as that of a slow sensor.
+/// A column with values in less than this share of the rows is taken for that of a slow sensor.
 const FILLED_SHARE: f64 = 0.95;
-/// Smallest number of values in the column of a slow sensor. Fewer values mean that the sensor failed.
+/// A column with fewer values is not taken for that of a slow sensor: the sensor failed.
 const ENOUGH: usize = 50;
-/// Largest number of row numbers in the report of unusable rows.
+/// Largest number of unusable rows that are reported with their row numbers.
 const ROWS_NAMED: usize = 20;
 
 /// Whether a log with many unusable rows is accepted.
@@ -20,20 +20,20 @@ pub enum Tolerance {
     /// A log with more than 5 % unusable rows is refused.
     #[default]
     Strict,
-    /// Unusable rows are dropped, however many.
+    /// Unusable rows are dropped, and the log is accepted however many there are.
     Lenient,
 }
 
-/// Why a row cannot be used.
+/// Reason why a row cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Reason {
-    /// A field is not a number, or fields are missing.
+    /// A value is not a number, or the row has too few values.
     Unreadable,
     /// A required column is empty.
     Incomplete,
-    /// An angle or an airspeed that no aircraft shows, or an infinite number in any column.
+    /// An angle or the airspeed is impossible, or any number is infinite.
     Impossible,
-    /// The time is not later than that of the row before.
+    /// The time is not later than that of the last usable row.
     OutOfOrder,
 }
 
@@ -56,17 +56,17 @@ pub(super) struct Rows {
     pub dropped: usize,
     /// Numbers of the first dropped rows.
     pub dropped_rows: Vec<usize>,
-    /// Rows dropped for each reason.
+    /// Number of rows dropped for each reason, in the order of [`Reason::ALL`].
     counts: [usize; Reason::ALL.len()],
-    /// Required columns that may be empty in a row, in the order of [`NEEDED`].
+    /// For each required column, in the order of [`NEEDED`]: whether it may be empty in a usable row.
     sparse: [bool; NEEDED.len()],
-    /// Time of the last usable row that was counted without being kept, s.
+    /// Time of the last usable row that was only counted, s.
     counted_s: Option<f64>,
 }
 
 impl Rows {
-    /// An empty table. Columns that only some of `rows` fill, such as those of a slow sensor beside a fast one, may
-    /// be empty in a usable row.
+    /// An empty table. A required column may be empty in a usable row if only some of `rows` fill it, because its sensor is
+    /// slower than the others.
     pub fn with_sparse_columns_of(rows: &[Sample]) -> Rows {
         let sparse = NEEDED.map(|name| {
             let get = index(name).map(|i| COLUMNS[i].1);
@@ -78,19 +78,20 @@ impl Rows {
         Rows { sparse, ..Rows::default() }
     }
 
-    /// Counts row `number`, without keeping it.
+    /// Counts row `number` as usable or unusable, without keeping it.
     fn count(&mut self, number: usize, sample: Option<Sample>) {
         let usable = self.judged(number, sample, self.counted_s);
         self.counted_s = usable.map(|row| row.time_s).or(self.counted_s);
     }
 
-    /// Counts the usable and the other rows without keeping any.
+    /// Counts the usable and the unusable ones of `rows` without keeping any.
     pub fn counted(mut self, rows: &[Sample]) -> Rows {
         rows.iter().enumerate().for_each(|(i, row)| self.count(i + 1, Some(*row)));
         self
     }
 
-    /// Keeps the usable rows. They stay in the memory of `rows`, because there may be no room for a second table.
+    /// Keeps the usable ones of `rows`, and counts all. The result uses the memory of `rows`, because there may be too little
+    /// for a second table.
     pub fn taken(mut self, mut rows: Vec<Sample>) -> Rows {
         let mut kept = 0_usize;
         for i in 0..rows.len() {
@@ -104,8 +105,8 @@ impl Rows {
         Rows { samples: rows, ..self }
     }
 
-    /// Counts row `number` and returns it if it is usable. `row` is `None` if it could not be read. `last` is the
-    /// time of the usable row before it, s.
+    /// Counts row `number` and returns it if it is usable. `row` is `None` if the row could not be read. `last` is the time of
+    /// the last usable row, s.
     pub fn judged(
         &mut self,
         number: usize,
@@ -131,14 +132,14 @@ impl Rows {
         }
     }
 
-    /// Keeps a row, complete or not, if it is later than the last kept one.
+    /// Keeps row `number` if it is later than the last kept row, even if required columns are empty.
     pub fn take_incomplete(&mut self, number: usize, sample: Sample) {
         let last = self.samples.last().map(|last| last.time_s);
         let later = self.later(number, sample, last);
         self.samples.extend(later);
     }
 
-    /// Counts row `number` and returns it, complete or not, if it is later than `last` (s).
+    /// Counts row `number` and returns it if its time is later than `last` (s), even if required columns are empty.
     pub fn later(&mut self, number: usize, sample: Sample, last: Option<f64>) -> Option<Sample> {
         let later = last.is_none_or(|last| sample.time_s > last);
         if later && sample.time_s.is_finite() {
@@ -148,20 +149,21 @@ impl Rows {
         self.judged(number, None, last)
     }
 
-    /// Number of the first dropped row, if so many were dropped that the log is refused; else `None`.
+    /// Whether too many rows were dropped for this tolerance: the number of the first dropped row, or `None` if the log is
+    /// accepted.
     pub fn refused(&self, tolerance: Tolerance) -> Option<usize> {
         let poor = self.dropped as f64 > REFUSED_SHARE * self.total as f64;
         let first = self.dropped_rows.first().copied();
         if tolerance == Tolerance::Strict && poor { first } else { None }
     }
 
-    /// Why rows were dropped, in words, with counts.
+    /// Text with the reasons for which rows were dropped, and the number of rows for each.
     pub fn reasons(&self) -> String {
         let said = Reason::ALL.iter().zip(self.counts).filter(|(_, count)| *count > 0);
         said.map(|((_, text), count)| format!("{count} {text}")).collect::<Vec<_>>().join(", ")
     }
 
-    /// Why a sample is unusable; `None` if it is usable. `last` is the time of the usable row before it, s.
+    /// The reason why the sample `s` is unusable; `None` if it is usable. `last` is the time of the last usable row, s.
     fn fault(&self, s: &Sample, last: Option<f64>) -> Option<Reason> {
         let missing = NEEDED
             .iter()
@@ -183,7 +185,7 @@ impl Rows {
     }
 }
 
-/// The sample, with the airspeed set to zero if it is the noise of a pitot tube at rest.
+/// The sample with its airspeed set to zero if the airspeed is noise of a pitot tube at rest.
 fn at_rest(mut sample: Sample) -> Sample {
     if (PITOT_AT_REST..0.0).contains(&sample.airspeed_mps) {
         sample.airspeed_mps = 0.0;
@@ -213,7 +215,7 @@ mod tests {
 
     #[test]
     fn a_pitot_at_rest_costs_no_row() {
-        // a PX4 log has −3.6 to −1.1 m/s before its flight; −20 m/s is a wrong unit or a fault
+        // A PX4 log has −3.6 to −1.1 m/s before take-off. An airspeed of −20 m/s is due to a wrong unit or a fault.
         let mut rows = Rows::default();
         for (k, airspeed) in [-3.6, -1.1, 0.2, 17.0, -20.0].into_iter().enumerate() {
             take(&mut rows, k + 1, Some(row(k as f64, airspeed)));
@@ -225,7 +227,7 @@ mod tests {
 
     #[test]
     fn a_slow_sensor_beside_a_fast_one_costs_no_row() {
-        // airspeed at 5 Hz in rows at 50 Hz: nine of ten fields are empty
+        // airspeed at 5 Hz in rows at 50 Hz: nine of ten rows have none
         let airspeed = |k: usize| if k.is_multiple_of(10) { 17.0 } else { f64::NAN };
         let all: Vec<Sample> = (0..1000).map(|k| row(k as f64 * 0.02, airspeed(k))).collect();
         let mut rows = Rows::with_sparse_columns_of(&all);

@@ -1,13 +1,13 @@
-//! Whether the rudder of a log moves.
+//! Checks whether the rudder moves in a log.
 
 use std::fmt;
 
 use super::{Sample, phases};
 use greylag_num::statistics::mean;
 
-/// Standard deviation of a deflection that counts as movement, rad: 0.2°. With Cnδr = −0.07/rad its moment is that of
-/// 0.2° of sideslip at Cnβ = 0.07/rad, which is less than the noise of a vane (0.3°). Ten seconds of doublets of 5° in
-/// ten minutes of flight have 0.6°.
+/// The rudder moves if the standard deviation of its deflection exceeds this value, rad (0.2°). With Cnδr = −0.07/rad a
+/// deflection of 0.2° causes the moment of 0.2° of sideslip at Cnβ = 0.07/rad, which is less than the noise of a vane (0.3°).
+/// Ten seconds of doublets of 5° in ten minutes of flight have a standard deviation of 0.6°.
 pub const MOVES_RAD: f64 = 0.0035;
 /// The same limit for a command, as a fraction of the unknown travel. 1 % of a travel of 25° is 0.25°. It exceeds the
 /// dead band of a servo (about 4 µs of 500 µs).
@@ -34,7 +34,7 @@ impl RudderMotion {
         sd(|s| s.rudder_cmd).filter(|sd| *sd > MOVES_PART).map(RudderMotion::Command)
     }
 
-    /// Standard deviation of the rudder, as a multiple of the smallest one that counts as movement.
+    /// Standard deviation of the rudder, divided by the limit above which it counts as movement.
     pub fn size(self) -> f64 {
         match self {
             RudderMotion::Deflection(sd) => sd / MOVES_RAD,
@@ -56,7 +56,7 @@ impl fmt::Display for RudderMotion {
     }
 }
 
-/// Standard deviation of the logged values in flight; `None` if there are too few.
+/// Standard deviation of the values of `get` in flight; `None` if there are too few.
 fn spread(rows: &[Sample], get: fn(&Sample) -> f64) -> Option<f64> {
     let flying = rows.iter().filter(|s| s.airspeed_mps > phases::Flying::default().from_mps);
     let values: Vec<f64> = flying.map(get).filter(|x| x.is_finite()).collect();
@@ -72,7 +72,7 @@ fn spread(rows: &[Sample], get: fn(&Sample) -> f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Rows at `airspeed` (m/s). `set` writes the rudder of each row; its argument is +1 and −1 in turn.
+    /// Rows at `airspeed` (m/s). `set` writes the rudder of each row; its second argument is +1 and −1 in turn.
     fn rows(airspeed: f64, set: impl Fn(&mut Sample, f64)) -> Vec<Sample> {
         let row = |k: usize| {
             let mut sample = Sample { airspeed_mps: airspeed, ..Sample::default() };

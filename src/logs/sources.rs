@@ -1,8 +1,8 @@
-//! Chooses the instance of each topic that is read, and lists the other instances.
+//! Chooses which instance of each topic is read, and lists the other instances.
 //!
-//! A topic has several instances if a vehicle carries two pitot tubes, for example, or if a VTOL has one controller
-//! for lift and one for wing-borne flight. The reader takes the first instance whose fields change, unless the
-//! vehicle's type calls for another one. A finding reports the choice.
+//! A topic has several instances if, for example, a vehicle carries two pitot tubes, or if a VTOL has one controller for lift
+//! and one for wing-borne flight. The reader takes the first instance whose fields change, unless the vehicle's type requires
+//! another one. A finding (a message to the user) reports the choice.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ use super::topics::{Topic, Topics, period_s};
 pub struct Asked {
     /// Name of the topic.
     pub topic: String,
-    /// Instance of the topic: a number, or system × 256 + component.
+    /// Number of the instance. In a MAVLink log it is system × 256 + component.
     pub instance: u16,
 }
 
@@ -49,12 +49,12 @@ impl std::str::FromStr for Asked {
     }
 }
 
-/// One instance of a topic that could fill columns.
+/// One instance of a topic from which columns could be filled.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Source {
     /// Name of the topic.
     pub topic: String,
-    /// The instance in the syntax of a mapping file.
+    /// The instance as it is written in a mapping file.
     pub instance: String,
     /// Sample rate from the median sample period, Hz.
     pub rate_hz: f64,
@@ -62,13 +62,13 @@ pub struct Source {
     pub from_s: f64,
     /// Time of the last sample, s.
     pub to_s: f64,
-    /// Whether any field that the rules use changes.
+    /// Whether the value of any field changes. Only fields that fill columns are considered.
     pub moves: bool,
     /// Whether the reader uses this instance.
     pub read: bool,
 }
 
-/// The instance that is read of each topic, by the topic's name.
+/// The chosen instance of each topic, by the topic's name.
 #[derive(Debug, Default)]
 pub(super) struct Choice {
     read: BTreeMap<String, u16>,
@@ -76,7 +76,7 @@ pub(super) struct Choice {
     asked: BTreeMap<String, u16>,
     /// All instances of each topic that has more than one.
     pub sources: Vec<Source>,
-    /// Findings about unusual choices.
+    /// Findings about choices that the user should know.
     pub findings: Vec<Finding>,
 }
 
@@ -145,7 +145,8 @@ impl Choice {
     }
 }
 
-/// Finding about the choice among the instances of the topic `name`; `None` if it needs no mention.
+/// Finding about the choice among the instances of the topic `name`. `None` if the user requested no instance, the first one
+/// is read and no other one changes.
 fn said(name: &str, sources: &[Source], asked: bool) -> Option<Finding> {
     let read = sources.iter().find(|s| s.read)?;
     let list = |of: &dyn Fn(&&Source) -> bool| -> Vec<&str> {
@@ -157,7 +158,7 @@ fn said(name: &str, sources: &[Source], asked: bool) -> Option<Finding> {
         format!("; {} moves too: --source {name}={other} reads it", others.join(", "))
     });
     let other = other.unwrap_or_default();
-    // An absent or failed second sensor does not matter while the first one is read.
+    // an absent or failed further sensor does not matter if the first one is read
     let usual = sources.first().is_some_and(|s| s.read);
     match (asked, dead.is_empty() || usual) {
         (true, _) => {

@@ -1,9 +1,9 @@
-//! Stretches of a long log. An inspection keeps only some stretches of topics with many samples, and statistics of
-//! all samples.
+//! Stretches of a long log. A stretch is an interval of 30 s. If a log is only inspected, and a topic has many samples, then
+//! only the samples of some stretches are kept in memory, and statistics of all samples.
 //!
-//! Some minutes of flight suffice to check units, signs, axes and delays. A single event may lie outside the kept
-//! stretches. Gaps and values that stay constant are therefore tracked in every sample, and one sample a second is
-//! kept throughout.
+//! Some minutes of flight suffice to check units, signs, axes and delays. But a single event may lie outside the kept stretches.
+//! Gaps and values that stay constant are therefore detected in all samples, and one sample per second is kept throughout the
+//! log.
 
 use super::phases::Phase;
 use super::quality::FROZEN_S;
@@ -14,26 +14,25 @@ pub(super) enum Keep {
     /// Every sample, as computations need.
     #[default]
     All,
-    /// Only stretches of the topics with more samples than [`MOST`].
+    /// Only stretches of the topics that have more samples than [`MOST`].
     Stretches,
 }
 
-/// Number of kept samples of a topic above which every second stretch is dropped.
+/// Largest number of kept samples of a topic. Above it, half of the kept stretches are dropped.
 pub(super) const MOST: usize = 65_536;
 /// Length of a stretch, s.
 pub(super) const LENGTH_S: f64 = 30.0;
-/// Largest number of times that the stretches are halved.
+/// Largest number of times that the kept stretches of a topic are halved.
 const LEVELS: u32 = 24;
-/// A time without samples is recorded as a gap if it exceeds both limits: a time in s, and a number of mean sample
-/// periods.
+/// A time without samples is recorded as a gap if it exceeds both limits: the first in s, the second in mean sample periods.
 const PAUSE_S: f64 = 0.1;
 const PAUSE_STEPS: f64 = 3.0;
 /// Largest number of recorded gaps of a topic, and of recorded constant intervals of a field.
 const NOTED: usize = 4096;
-/// Time between the samples that are kept even outside the kept stretches, s.
+/// Smallest time between the samples that are kept throughout the log, s.
 const COARSE_S: f64 = 1.0;
 
-/// Selection of every 2^n-th stretch, for level n.
+/// Selection of stretches: at level n, every 2^n-th stretch is kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Level(u32);
 
@@ -43,7 +42,7 @@ impl Level {
         self.0 > 0
     }
 
-    /// The number n, where one of n stretches is kept.
+    /// The ratio of all stretches to kept stretches.
     pub fn every(self) -> usize {
         1 << self.0
     }
@@ -53,12 +52,12 @@ impl Level {
         (time_s / LENGTH_S).floor() as i64 % (1 << self.0) == 0
     }
 
-    /// The level with half of the stretches; `None` after `LEVELS` halvings.
+    /// The level that keeps half as many stretches; `None` after `LEVELS` halvings.
     pub fn halved(self) -> Option<Level> {
         (self.0 < LEVELS).then_some(Level(self.0 + 1))
     }
 
-    /// The level that keeps fewer stretches.
+    /// The one of the two levels that keeps fewer stretches.
     pub fn sparser(self, other: Level) -> Level {
         Level(self.0.max(other.0))
     }
@@ -72,10 +71,10 @@ struct Stay {
     to_s: f64,
 }
 
-/// Statistics of every sample of a topic, kept or not.
+/// Statistics over all samples of a topic, kept or not.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Watch {
-    /// Number of samples at increasing times.
+    /// Number of samples. A sample counts only if it is later than the previous one.
     pub samples: usize,
     /// Time of the first and of the last sample, s.
     pub span_s: Option<(f64, f64)>,
@@ -83,16 +82,17 @@ pub(super) struct Watch {
     pub largest_gap_s: f64,
     /// Gaps that are much longer than the mean sample period: start and length, s.
     pub gaps: Vec<(f64, f64)>,
-    /// Ended intervals in which each field keeps one nonzero value: from, to, s.
+    /// For each field, the ended intervals in which its value stayed constant, not zero, for longer than `FROZEN_S`: start and
+    /// end, s.
     stays: Vec<Vec<(f64, f64)>>,
     current: Vec<Stay>,
-    /// One sample a second: times (s), then the values of each field.
+    /// One sample per second: the times (s), and in `coarse` the values of each field.
     pub coarse_s: Vec<f64>,
     pub coarse: Vec<Vec<f64>>,
 }
 
 impl Watch {
-    /// Updates the statistics with a sample at `time_s` (s). A sample that is not later than the last is ignored.
+    /// Updates the statistics with a sample at `time_s` (s). The sample is ignored if it is not later than the previous one.
     pub fn take(&mut self, time_s: f64, values: &[f64]) {
         if !time_s.is_finite() || self.span_s.is_some_and(|(_, last)| time_s <= last) {
             return;
@@ -109,7 +109,7 @@ impl Watch {
         self.stay(time_s, values);
     }
 
-    /// Keeps the sample if the last sample kept in this way is at least a second old.
+    /// Keeps the sample if at least a second has passed since the last sample that this function kept.
     pub fn coarsely(&mut self, time_s: f64, values: &[f64]) {
         if self.coarse_s.last().is_none_or(|last| time_s - last >= COARSE_S) {
             self.coarse_s.push(time_s);
@@ -134,23 +134,23 @@ impl Watch {
         }
     }
 
-    /// Intervals in which the field with index `field` keeps one nonzero value: from, to, s.
+    /// Intervals in which the field with index `field` stayed constant, not zero, for longer than `FROZEN_S`: start and end, s.
     pub fn stays(&self, field: usize) -> Vec<(f64, f64)> {
         let ended = self.stays.get(field).into_iter().flatten().copied();
         ended.chain(self.current.get(field).and_then(long)).collect()
     }
 }
 
-/// The interval of `stay` (from, to, s), if its value is nonzero and lasts longer than `FROZEN_S`.
+/// Start and end (s) of the interval `stay`. `None` if its value is zero or it is not longer than `FROZEN_S`.
 fn long(stay: &Stay) -> Option<(f64, f64)> {
     let noted = stay.value != 0.0 && stay.to_s - stay.from_s > FROZEN_S;
     noted.then_some((stay.from_s, stay.to_s))
 }
 
-/// Statistics of a whole long log whose fast topics were inspected in stretches only.
+/// Statistics of a whole long log of which only stretches of the topics with many samples were inspected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stretches {
-    /// The number n, where one of n stretches was inspected.
+    /// The number n: one of n stretches was inspected.
     pub every: usize,
     /// Length of a stretch, s.
     pub length_s: f64,
@@ -165,7 +165,7 @@ pub struct Stretches {
 }
 
 impl Stretches {
-    /// The note to the user, in words.
+    /// Text of a note for the user.
     pub(super) fn said(&self) -> String {
         format!(
             "a long log of {} rows: a look at it judges units, signs and axes by one of {} stretches of {:.0} s; \

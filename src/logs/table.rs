@@ -1,13 +1,16 @@
-//! Resamples channels with different sample rates onto one table.
+//! Resamples the fields of a log, which have different sample rates, onto one table.
 //!
-//! The table's times are those of the faster of attitude and body rates. Continuous channels are interpolated
-//! linearly: angles after unwrapping, quaternions before their conversion to angles. Commands are held. No value is
-//! carried across more than 0.1 s or, in a slower channel, three sample periods. Gaps in the table's own times stay
-//! gaps.
+//! A topic is one type of message in a log. A rule tells which topic and which of its fields fill which columns. The samples that
+//! a rule selects form a channel.
 //!
-//! A channel that is much slower than the table (velocity over ground at 10 Hz) fills only the row that follows each
-//! of its samples, because interpolated rows would count as measurements. The other rows stay empty; required columns
-//! hold the last value there.
+//! The table's times are those of attitude or body rates, whichever has more samples. Continuous channels are interpolated
+//! linearly: angles after unwrapping, quaternions before their conversion to angles. Commands are held until the next sample. A
+//! gap in a channel is filled only if it is at most 0.1 s long or, in a slower channel, at most three sample periods. Gaps in
+//! the table's own times stay gaps.
+//!
+//! If a measured channel is much slower than the table (such as velocity over ground at 10 Hz), each sample fills only the row
+//! that follows it. Interpolated rows would count as further measurements. The other rows stay empty; only in required columns
+//! do they hold the last value.
 
 mod absent;
 mod clean;
@@ -29,17 +32,16 @@ use clean::cleaned;
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, standard_density};
 pub(super) use whole::Whole;
 
-/// The longest time that a fast channel is carried over, s.
+/// Longest gap of a fast channel that is filled, s.
 const GAP_S: f64 = 0.1;
-/// The longest time that a slow channel is carried over, in its sample periods.
+/// Longest gap of a slow channel that is filled, in sample periods of the channel.
 const GAP_PERIODS: f64 = 3.0;
-/// A channel with at least this share of finite values is preferred to one with less.
+/// A channel with at least this share of finite values replaces one with less.
 const GOOD_SHARE: f64 = 0.5;
-/// A preferred channel slower than this, Hz, is replaced by one that is more than five times as fast.
+/// A channel that is slower than this value, Hz, is replaced by one that is more than five times as fast.
 const SLOW_HZ: f64 = 10.0;
-/// A measured channel whose sample rate is below this fraction of the table's fills only the rows of its own samples.
-/// If its values were held, more than a third of them would repeat the previous value. The flight-path reconstruction
-/// drops such repeats as those of a slow sensor.
+/// A measured channel whose sample rate is below this fraction of the table's fills only one row per sample. If its values were
+/// held, more than a third of the rows would repeat the previous value. The flight-path reconstruction drops such repeats.
 const SPARSE: f64 = 0.65;
 /// Columns that are measurements in the flight-path reconstruction. The other columns are its inputs.
 const MEASURED: [&str; 9] = [
@@ -54,21 +56,22 @@ const MEASURED: [&str; 9] = [
     "vd_mps",
 ];
 
-/// A rule with the times of its usable samples. The values are computed for one track at a time, because those of all
-/// tracks would take as much memory as the topics.
+/// A channel: a rule with the times of its usable samples. The values are computed for one channel at a time, because those of
+/// all channels would take as much memory as the topics.
 struct Track<'a> {
     rule: Rule,
     origin: String,
     times: Cow<'a, [f64]>,
     /// Whether all samples have the same value.
     dead: bool,
+    /// Share of the topic's samples that are usable.
     finite_share: f64,
     rate_hz: f64,
     topic: &'a Topic,
 }
 
 impl Track<'_> {
-    /// The values at its times: one series, or the four components of a quaternion.
+    /// The values of the usable samples: one series, or the four components of a quaternion.
     fn series(&self) -> Vec<Vec<f64>> {
         let all = self.rule.series(self.topic);
         all.map(|all| cleaned(&self.topic.time_s, all).1).unwrap_or_default()
@@ -82,18 +85,18 @@ impl Track<'_> {
         Reader::new(&self.rule, &self.times, series, self.limit_s())
     }
 
-    /// Whether the channel is a measurement whose sample period is much longer than that of the rows, `period` (s).
+    /// Whether the channel is a measurement whose sample period is much longer than the time between rows, `period` (s).
     fn is_sparse(&self, period: f64) -> bool {
         let measured = self.rule.columns().iter().all(|c| MEASURED.contains(c));
         measured && self.rate_hz > 0.0 && self.rate_hz * period < SPARSE
     }
 
-    /// Statistics of all samples of the topic; `None` unless only stretches of them are kept.
+    /// Statistics of all samples of the topic, if only some stretches (intervals of 30 s) are kept in memory; otherwise `None`.
     fn watch(&self) -> Option<&Watch> {
         self.topic.watch.as_deref().filter(|_| self.topic.level.thins())
     }
 
-    /// Number of usable samples, including those that are not kept.
+    /// Number of usable samples, including those that are not kept in memory.
     fn samples(&self) -> usize {
         match self.watch() {
             Some(watch) => (self.finite_share * watch.samples as f64).round() as usize,
@@ -101,7 +104,7 @@ impl Track<'_> {
         }
     }
 
-    /// The track as a channel. `series` are its values, whose quality is assessed.
+    /// The summary of this channel for the user. It includes the quality of the values, `series`.
     fn channel(&self, series: &[Vec<f64>]) -> Channel {
         let gap = self.times.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
         let column = self.rule.columns()[0];
@@ -132,13 +135,13 @@ pub(super) struct Table {
     pub notes: Vec<String>,
     /// Required columns without data.
     pub missing: Vec<Missing>,
-    /// All instances of each topic that has more than one.
+    /// All instances (such as sensors of the same kind) of each topic that has more than one.
     pub sources: Vec<Source>,
     /// Findings about unusual sources.
     pub findings: Vec<Finding>,
     /// The rule that fills each column.
     pub rules: Vec<Rule>,
-    /// Statistics of the whole log, if only stretches are kept.
+    /// Statistics of the whole log, if only stretches of it are kept in memory.
     pub whole: Option<Whole>,
 }
 
@@ -211,7 +214,7 @@ pub(super) fn build(topics: &Topics, rules: &[Rule], asked: &[Asked]) -> Table {
 
 /// The required columns that are not `filled`.
 fn lacking(rules: &[Rule], filled: impl Fn(&str) -> bool) -> Vec<Missing> {
-    // The time, which is the first required column, comes with every channel.
+    // the first required column is the time, which every channel has
     let missing = |column: &'static str, or: Option<&'static str>| {
         let of_column = rules.iter().filter(|r| r.columns().contains(&column));
         Missing { column, or, looked_for: of_column.map(Rule::origin).collect() }
@@ -221,7 +224,8 @@ fn lacking(rules: &[Rule], filled: impl Fn(&str) -> bool) -> Vec<Missing> {
     alone.chain(either.map(|(c, p)| missing(c, Some(p)))).collect()
 }
 
-/// Chooses the best rule with data for each column. Also returns findings about replaced rules and absent fields.
+/// Chooses for each column the best channel. Also returns findings about channels that were replaced because they never change,
+/// and about absent fields.
 fn choose<'a>(
     topics: &'a Topics,
     rules: &[Rule],
@@ -238,8 +242,8 @@ fn choose<'a>(
         let filled = |t: &Track<'a>| t.rule.columns().iter().any(|c| rule.columns().contains(c));
         let taken = chosen.iter().any(filled);
         match chosen.iter_mut().find(same) {
-            // If a roll angle replaces a quaternion, pitch and yaw are free again and are chosen next. Otherwise they
-            // are skipped here, so that angles and a quaternion are never mixed.
+            // A quaternion fills roll, pitch and yaw, and rules for single angles are then skipped here. If a roll angle replaces
+            // the quaternion, pitch and yaw are no longer filled, and their rules are chosen next.
             None if taken => {}
             None => chosen.push(track),
             Some(old) => {
@@ -267,14 +271,15 @@ fn choose<'a>(
     (chosen, findings)
 }
 
-/// The usable samples of a rule in the chosen `instance`: finite values at increasing times.
+/// The channel of `rule` in the chosen `instance` of its topic; `None` if there is no instance or no usable sample. A sample is
+/// usable if its values are finite and its time is later than that of the sample before.
 fn track<'a>(topics: &'a Topics, rule: &Rule, instance: Option<u16>) -> Option<Track<'a>> {
     let instance = instance?;
     let topic = topics.topics.get(&(rule.topic.clone(), instance))?;
     track_of(topics, topic, rule, instance)
 }
 
-/// The usable samples of a rule in an instance of its topic; `None` if there are none.
+/// The channel of `rule` in `topic`, which is one instance of the rule's topic; `None` if it has no usable sample.
 fn track_of<'a>(
     topics: &Topics,
     topic: &'a Topic,
@@ -314,7 +319,7 @@ fn fill_sparse(
     let Some(reader) = track.reader(series) else { return fresh };
     let mut next = 0;
     for t in track.times.iter() {
-        // The first row at or after the sample. Rows and samples are in order of time.
+        // `next` becomes the first row at or after the sample; rows and samples are in order of time
         next += rows[next..].iter().take_while(|row| row.time_s < t - SAME_S).count();
         if rows.get(next).is_some_and(|row| row.time_s - t <= period) {
             fresh[next] = true;
@@ -324,7 +329,7 @@ fn fill_sparse(
     fresh
 }
 
-/// Fills the required columns of `track` with their last value in the rows that are not `fresh`.
+/// If the channel fills a required column: fills its columns in the rows that are not `fresh` with their last values.
 fn hold(rows: &mut [Sample], track: &Track<'_>, fresh: &[bool]) {
     if !track.rule.columns().iter().any(|c| NEEDED.contains(c)) {
         return;
@@ -342,7 +347,7 @@ fn hold(rows: &mut [Sample], track: &Track<'_>, fresh: &[bool]) {
     }
 }
 
-/// Converts equivalent airspeed into true airspeed. Returns a note on the densities used.
+/// Converts the airspeed of `rows` from equivalent to true airspeed. Returns a note on the air densities that were used.
 fn make_true(rows: &mut [Sample]) -> String {
     let mut by = [0usize; 3];
     for row in rows.iter_mut().filter(|row| row.airspeed_mps.is_finite()) {
@@ -362,7 +367,7 @@ fn make_true(rows: &mut [Sample]) -> String {
     )
 }
 
-/// Removes the rows before all required channels have begun and those after one has ended.
+/// Removes the rows before the first one in which all required columns are filled, and those after the last such row.
 fn cut_ends(rows: &mut Vec<Sample>, notes: &mut Vec<String>) {
     let whole =
         |s: &Sample| NEEDED.iter().all(|c| index(c).is_none_or(|i| COLUMNS[i].1(s).is_finite()));

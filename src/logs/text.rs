@@ -1,4 +1,4 @@
-//! Reads the flights of a CSV table and checks them.
+//! Reads the flights of a CSV table and checks them. A table may contain several recordings, one after the other.
 
 use std::io::BufRead;
 use std::path::Path;
@@ -88,7 +88,7 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
         let names = reading.unknown_columns.join(", ");
         findings.push(Finding::note(format!("columns that the log format does not name: {names}")));
     }
-    // Without times every row is dropped, which the finding on the missing column implies.
+    // Without times every row is dropped. The finding about the missing column suffices.
     findings.extend(dropped(reading.dropped, &reading.dropped_rows).filter(|_| !timeless));
     let (sensors, notes) = (options.mapping.sensors().clone(), made);
     Ok(Log {
@@ -108,7 +108,7 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
     })
 }
 
-/// Returns the usable rows of a table that lacks no column. Too few of them are an error for a computation, and a
+/// Returns the usable rows of a table that lacks no column. Too many unusable rows are an error for a computation, and a
 /// finding for an inspection.
 fn settled(
     raw: Raw,
@@ -129,7 +129,7 @@ fn settled(
 /// Largest number of column names in a finding.
 const SHOWN: usize = 40;
 
-/// Finding about a table that lacks several columns. It also names `unknown` columns of the table.
+/// Finding about a table that lacks several columns. It also names columns of the table that are not known.
 fn lacks(path: &Path, missing: &[CsvError], unknown: &[String]) -> Finding {
     let either = |column: &str| EITHER.iter().find(|(command, _)| *command == column);
     let named = missing.iter().filter_map(|error| match error {

@@ -1,14 +1,14 @@
 //! Reads MAVLink telemetry logs into topics.
 //!
-//! A record is the host's time (µs since 1970, big-endian) followed by a frame. The crate `mavlink` has no reader for
-//! such files. The modules of `link` separate the frames and decode the messages.
+//! A record is the host's time (µs since 1970, big-endian) followed by a frame. The host is the computer that wrote the log.
+//! The crate `mavlink` has no reader for such files. The modules of `link` separate the frames and decode the messages.
 //!
-//! The time of a message is that of the sender's clock. A message without a time stamp (VFR_HUD) has only the host's
-//! time. It is converted to the sender's clock by linear interpolation between the messages around it. This is
-//! correct in lockstep too, where the host's clock is unrelated to that of the flight.
+//! The time of a message is that of the sender's clock. A message without a time stamp (VFR_HUD) has only the host's time. It
+//! is converted to the sender's clock by linear interpolation between the messages around it. This is also correct for a
+//! simulation that does not run in real time.
 //!
-//! The clock of a vehicle starts at zero at each boot. The log of each boot of each vehicle is a flight of its own, because
-//! its times cannot be compared with those of another boot.
+//! The clock of a vehicle starts at zero at each boot. The log of each boot of each vehicle is a flight of its own, because its
+//! times cannot be compared with those of another boot.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -24,27 +24,27 @@ use greylag_link::logged::{self, Logged, Own};
 
 /// Bytes of the host's time.
 const STAMP: usize = 8;
-/// A time stamp that differs from the clock of its system by more than this, s, counts as that of another clock.
+/// A time stamp that differs by more than this from the clock of its system, s, counts as that of another clock.
 const SAME_CLOCK_S: f64 = 5.0;
 /// Time after which the 32 bits of `time_boot_ms` overflow, s.
 const WRAP_MS_S: f64 = 4_294_967.296;
 
 /// Backward jump of a vehicle's time that counts as a restart, s.
 const BACK_S: f64 = 5.0;
-/// Number of attitude messages from which a further system counts as another vehicle.
+/// Number of attitude messages from which a further system counts as a vehicle.
 const VEHICLE: usize = 50;
 /// Number of successive messages that show a restart. A single message may be late or wrong.
 const BACK_FOR: usize = 5;
 
-/// A message before its time is known.
+/// A message whose time is not yet computed.
 struct Entry {
-    /// The number of its record in the file.
+    /// Number of its record. Only records with a message of a known type are counted.
     at: usize,
     host_s: f64,
     own_s: Option<f64>,
 }
 
-/// A pair of the host's and the sender's time, s, from record number `at`.
+/// A pair of the host's and the sender's time, s, from the record with the number `at`.
 #[derive(Clone, Copy)]
 struct Tick {
     host_s: f64,
@@ -57,13 +57,13 @@ struct Stream {
     topic: &'static str,
     count: usize,
     entries: Vec<Entry>,
-    /// Their values; `None` if the messages are only counted.
+    /// Values of the messages; `None` if the messages are only counted.
     values: Option<Topic>,
 }
 
 #[derive(Default)]
 struct Reader {
-    /// The streams by message number and sender.
+    /// The streams by message id and sender.
     streams: BTreeMap<(u32, u16), Stream>,
     /// Clock of each sender, by system × 256 + component.
     clocks: BTreeMap<u16, Vec<Tick>>,
@@ -151,8 +151,8 @@ impl Reader {
     }
 
     fn finish(mut self, skipped: usize, cut: usize) -> Vec<Topics> {
-        // Components of one system share its clock. The component with the most messages gives the most accurate
-        // clock.
+        // Components of one system have the same clock. The clock of the component with the most time stamps is the most
+        // accurate.
         let mut clocks: BTreeMap<u8, Vec<Tick>> = BTreeMap::new();
         for (source, clock) in std::mem::take(&mut self.clocks) {
             let best = clocks.entry(source.to_be_bytes()[0]).or_default();
@@ -201,7 +201,8 @@ impl Reader {
         out
     }
 
-    /// The boots of the systems that send an attitude: for each boot its system and the range of its record numbers.
+    /// The boots of the vehicles: for each boot the number of its system and the range of its record numbers. Systems with few
+    /// attitude messages are not vehicles, unless no system has more.
     fn lives(&self, clocks: &BTreeMap<u8, Vec<Tick>>) -> Vec<(u8, Range<usize>)> {
         let mut attitudes: BTreeMap<u8, usize> = BTreeMap::new();
         for ((_, source), stream) in &self.streams {
@@ -265,7 +266,7 @@ impl Reader {
     }
 }
 
-/// Numbers of the records at which a vehicle has restarted.
+/// Numbers of the records at which the vehicle with the clock `clock` starts again.
 fn starts(clock: &[Tick]) -> Vec<usize> {
     let back = |i: &usize| {
         let before = clock[i - 1].own_s - BACK_S;
@@ -275,13 +276,14 @@ fn starts(clock: &[Tick]) -> Vec<usize> {
     (1..clock.len()).filter(back).map(|i| clock[i].at).collect()
 }
 
-/// A sender's time, s, with the overflow of its 32 bits removed. `last` is its previous time.
+/// A sender's time `own`, s, without the overflow of its 32 bits. `last` is the sender's previous time.
 fn unwrapped(own: f64, last: Option<f64>) -> f64 {
     let last = last.unwrap_or(own);
     own + ((last - own) / WRAP_MS_S).round() * WRAP_MS_S
 }
 
-/// The times of messages on the clock of their system, s. Without that clock they are the sender's own or the host's.
+/// The times of messages on the clock of their system, s. If that clock is unknown, they are the sender's own times or the
+/// host's.
 fn times(entries: &[Entry], clock: Option<&Vec<Tick>>) -> Vec<f64> {
     let clock = clock.map_or(&[][..], Vec::as_slice);
     let mut after = 0;
@@ -299,8 +301,8 @@ fn times(entries: &[Entry], clock: Option<&Vec<Tick>>) -> Vec<f64> {
 /// Number of ticks that are tried in turn before a binary search.
 const STEPS: usize = 8;
 
-/// Index of the first tick that is not before the host's time `host` (s). The search begins at the index `from`,
-/// because messages mostly come in order.
+/// Index of the first tick that is not before the host's time `host` (s). The search begins at the index `from`, because
+/// messages mostly arrive in order.
 fn place(clock: &[Tick], host: f64, from: usize) -> usize {
     let before = |c: &Tick| c.host_s < host;
     let follows = from == 0 || clock.get(from - 1).is_some_and(before);

@@ -1,4 +1,5 @@
-//! Content of a binary log: topics whose numeric fields are time series.
+//! Content of a binary log: topics (message or record types) whose numeric fields are time series. A topic has several instances
+//! if, for example, there are several sensors of a kind.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +15,7 @@ pub(super) struct Topic {
     pub fields: Vec<String>,
     /// The fields' values, in the order of `fields`, each as long as `time_s`.
     pub values: Vec<Vec<f64>>,
-    /// Which stretches of the topic are kept.
+    /// Selection of the kept stretches (intervals of 30 s) of the topic.
     pub level: Level,
     /// Statistics of all samples, kept or not; `None` if the log is read with `Keep::All`.
     pub watch: Option<Box<Watch>>,
@@ -51,7 +52,7 @@ impl Topic {
         watched.filter(|_| self.level.thins()).or(self.time_s.last().copied())
     }
 
-    /// Drops the samples outside the stretches of `level`.
+    /// Drops the samples outside the stretches that `level` keeps.
     fn thin(&mut self, level: Level) {
         self.level = level;
         let mut kept = 0;
@@ -66,14 +67,14 @@ impl Topic {
         self.values.iter_mut().for_each(|column| column.truncate(kept));
     }
 
-    /// One sample a second throughout the log; `None` if all samples of the topic are kept.
+    /// One sample per second throughout the log; `None` if all samples of the topic are kept.
     pub fn coarse(&self) -> Option<Topic> {
         let watch = self.watch.as_ref().filter(|_| self.level.thins())?;
         let (time_s, values) = (watch.coarse_s.clone(), watch.coarse.clone());
         Some(Topic { time_s, values, fields: self.fields.clone(), ..Topic::default() })
     }
 
-    /// Whether a field exists and has at least two different finite values.
+    /// Whether the field `name` exists and has at least two different finite values.
     pub fn moves(&self, name: &str) -> bool {
         let Some(values) = self.field(name) else { return false };
         let mut finite = values.iter().filter(|x| x.is_finite());
@@ -103,18 +104,18 @@ pub(super) fn period_s(times: &[f64]) -> f64 {
     *steps.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// How the instances of a topic are written.
+/// How the instances of a topic are named in texts and mappings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Naming {
     /// By a number from 0 on.
     #[default]
     Number,
-    /// By the MAVLink sender as `system/component`. The instance number is system × 256 + component.
+    /// By the MAVLink sender, as `system/component`. The number of the instance is system × 256 + component.
     Sender,
 }
 
 impl Naming {
-    /// An instance as it is written in a mapping.
+    /// Name of an instance in texts and mappings.
     pub fn written(self, instance: u16) -> String {
         let [system, component] = instance.to_be_bytes();
         match self {
@@ -124,8 +125,8 @@ impl Naming {
     }
 }
 
-/// Largest number of flights that are read from one file. Each flight has a copy of the parameters, so the thousands
-/// of apparent restarts in a damaged file would take all memory.
+/// Largest number of flights that are read from one file. Each flight has a copy of the parameters. Without this limit, the
+/// thousands of apparent restarts in a damaged file would use up the memory.
 pub(super) const MOST_FLIGHTS: usize = 200;
 
 /// Finding about a file with more than [`MOST_FLIGHTS`] flights.
@@ -135,14 +136,14 @@ pub(super) fn too_many() -> Finding {
     ))
 }
 
-/// The content of a binary log, or of one boot of a vehicle in it.
+/// The content of a binary log. If the log contains several flights (boots or vehicles), it is the content of one of them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Topics {
-    /// Vehicle and boot of this flight, in words; `None` unless the file holds several.
+    /// Text that names vehicle and boot of this flight; `None` unless the file contains several flights.
     pub life: Option<String>,
     /// The MAVLink system of this flight; `None` in other formats.
     pub system: Option<u8>,
-    /// How instances are written.
+    /// How instances are named.
     pub naming: Naming,
     /// Name and version of the firmware; empty if the log has none.
     pub firmware: String,
@@ -150,7 +151,7 @@ pub(super) struct Topics {
     pub topics: BTreeMap<(String, u16), Topic>,
     /// Number of records of each topic of the file, requested or not.
     pub counts: BTreeMap<(String, u16), usize>,
-    /// Parameters of the vehicle; the last value of each.
+    /// Last value of each parameter of the vehicle, by name.
     pub parameters: BTreeMap<String, f64>,
     /// Findings about the file.
     pub findings: Vec<Finding>,
@@ -182,7 +183,7 @@ impl Topics {
         self.topics.is_empty() && has("TIME") && has("STAT") && has("ATT")
     }
 
-    /// Makes all topics of which only stretches are kept hold the same stretches, and frees their unused memory.
+    /// Drops stretches until all topics of which only stretches are kept have the same ones. Then frees unused memory.
     pub fn align(&mut self) {
         let level = self.topics.values().fold(Level::default(), |l, t| l.sparser(t.level));
         let fast = self.topics.values_mut().filter(|t| t.level.thins() && t.level != level);

@@ -1,12 +1,15 @@
-//! Reads PX4 ULog files into topics.
+//! Reads PX4 ULog files into topics (types of messages with their time series).
 //!
-//! No published crate is used (examined: `px4-ulog` 0.6.1, `yule_log` 0.4.0). `px4-ulog` stops at the first
-//! inconsistent record, refuses a second registration of a message number, panics by design where a value's type
-//! changes, and decodes every field of every topic. `yule_log` depends on a logger and on a regular-expression
-//! engine. Neither can skip topics that are not needed. `tests/logs_crosscheck.py` compares the results with pyulog.
+//! A ULog file consists of records: formats of topics, subscriptions (which give a topic a message number), data records with
+//! such a number, parameters, and others.
 //!
-//! Not read: logged strings, offsets of appended data (it is read in file order), defaults of
-//! parameters. Parameter changes in flight overwrite the value.
+//! No published crate is used (examined: `px4-ulog` 0.6.1, `yule_log` 0.4.0). `px4-ulog` stops at the first inconsistent record,
+//! refuses a second subscription with the same message number, panics by design where a value's type changes, and decodes every
+//! field of every topic. `yule_log` depends on a logger and on a regular-expression engine. Neither can skip topics that are not
+//! needed. `tests/logs_crosscheck.py` compares the results with pyulog.
+//!
+//! Not read: logged strings, offsets of appended data (it is read in file order), default values of parameters. If a parameter
+//! changes in flight, the last value is kept.
 
 mod layout;
 mod subscriptions;
@@ -24,18 +27,18 @@ use super::window::Window;
 use layout::Layout;
 use subscriptions::{Series, Subscription, Subscriptions};
 
-/// Bytes of the file's header: magic, version and start time.
+/// Size of the file's header (magic, version and start time), bytes.
 const HEADER: usize = 16;
-/// Bytes of a record's header: size and kind.
+/// Size of a record's header (size and kind), bytes.
 const RECORD: usize = 3;
-/// Bytes that are viewed at once: the longest record and the beginning of those after it.
+/// Number of bytes that are viewed at once: the longest record and the beginning of the records after it.
 const LONGEST: usize = RECORD + u16::MAX as usize + 1024;
-/// Number of successive records that are checked before one is taken as valid.
+/// Number of successive records that must be valid before a record is accepted.
 const IN_STEP: usize = 3;
-/// Letters of the kinds of records.
+/// Letters that stand for the kinds of records.
 const KINDS: &[u8] = b"BFIMPQARDCLSO";
 
-/// The records after the present one that were found valid: their number and bytes.
+/// The records after the present one that were found valid: their number, and their size in bytes.
 #[derive(Clone, Copy, Default)]
 struct Ahead {
     records: usize,
@@ -44,10 +47,10 @@ struct Ahead {
 
 #[derive(Default)]
 struct Reader {
-    /// Records after the last accepted one that were checked together with it.
+    /// Records after the last accepted one that were found valid together with it.
     ahead: Ahead,
     formats: BTreeMap<String, String>,
-    /// The layout of each topic, which all its subscriptions share.
+    /// The layout of each topic. All subscriptions of the topic share it.
     layouts: BTreeMap<String, Rc<Layout>>,
     subscriptions: Subscriptions,
     series: Series,
@@ -59,33 +62,34 @@ struct Reader {
     dropouts: usize,
     /// Number of data records whose message number has no subscription.
     orphans: usize,
-    /// Topics with a subscription before the file stated their format.
+    /// Topics that were subscribed to before the file stated their format.
     formless: BTreeSet<String>,
+    /// Number of data records that are shorter than their topic's layout.
     short: usize,
-    /// Whether the last bytes were a valid record.
+    /// Whether a valid record ends at the present place of the file.
     in_step: bool,
     /// Number of bytes that belong to no record.
     skipped: usize,
-    /// Seconds lost at each damaged place; NaN until the next valid record.
+    /// Time between the last data record before and the first one after each damaged place, s. NaN until the latter is read.
     holes: Vec<f64>,
-    /// Time of the last data, s.
+    /// Time of the last data record, s.
     last_s: f64,
 }
 
-/// Whether valid records may include data of topics that the file does not declare.
+/// Whether data records of topics without a subscription may count as valid.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Undeclared {
     Allowed,
     Refused,
 }
 
-/// Kind of content at a position of the file.
+/// What begins at a place of the file.
 enum Place {
-    /// A record of this many bytes, with its header.
+    /// A valid record of this many bytes, including its header.
     Record(usize),
-    /// A record that is cut off by the end of the file.
+    /// A record that the end of the file cuts off.
     Cut,
-    /// An invalid record.
+    /// No valid record.
     Damage,
 }
 
@@ -130,8 +134,7 @@ pub(super) fn read<'a>(
     (reader.finish(), window)
 }
 
-/// Length in bytes, with the header, and kind of the record at the beginning of `view`; `None` if no record begins
-/// there.
+/// Length (bytes, including the header) and kind of the record at the beginning of `view`; `None` if no record begins there.
 fn header(view: &[u8]) -> Option<(usize, u8)> {
     let [low, high, kind, ..] = view else { return None };
     let size = usize::from(u16::from_le_bytes([*low, *high]));
@@ -139,10 +142,10 @@ fn header(view: &[u8]) -> Option<(usize, u8)> {
 }
 
 impl Reader {
-    /// Kind of content at the beginning of `view`.
+    /// What begins at the beginning of `view`.
     ///
-    /// A record is valid if several others follow it. After a damaged place, the record itself must
-    /// also be a data record of the size of its topic.
+    /// A record is valid if the records that follow it are valid too. After a damaged place, it and the records that follow must
+    /// moreover be data records with the sizes of their topics.
     fn place(&mut self, view: &[u8]) -> Place {
         let Some((len, kind)) = header(view) else { return Place::Damage };
         let exact = kind == b'D' && self.fits(view, len);
@@ -151,15 +154,15 @@ impl Reader {
             return if believed { Place::Cut } else { Place::Damage };
         }
         let fits = match self.in_step {
-            // The right size does not make a record valid, because damage may have begun within it.
+            // the right size does not suffice, because the damage may begin within the record
             true => self.goes_on(&view[len..], len, kind),
             false => self.is_in_step(view, IN_STEP, Undeclared::Refused),
         };
         if fits { Place::Record(len) } else { Place::Damage }
     }
 
-    /// Whether valid records follow a record of `len` bytes. Records that were checked together with the preceding
-    /// one are not checked again, unless this record is a declaration.
+    /// Whether valid records follow a record of this kind and `len` bytes. `rest` begins after it. Records that were checked
+    /// together with the record before are not checked again, unless this record is not a data record.
     fn goes_on(&mut self, rest: &[u8], len: usize, kind: u8) -> bool {
         let seen = match self.ahead {
             Ahead { records, bytes } if kind == b'D' && records > 0 && bytes >= len => {
@@ -182,12 +185,12 @@ impl Reader {
             }
             ahead = Ahead { records: ahead.records + 1, bytes: ahead.bytes + next };
         }
-        // After a declaration other records may be valid, so they are checked again.
+        // a record other than data may declare topics, so the records after it are checked again
         self.ahead = if kind == b'D' { ahead } else { Ahead::default() };
         true
     }
 
-    /// Whether `count` records at the beginning of `view` follow each other, each of the size of its topic.
+    /// Whether `view` begins with `count` valid records. A data record is valid if it has the size of its topic.
     fn is_in_step(&self, mut view: &[u8], count: usize, undeclared: Undeclared) -> bool {
         for _ in 0..count {
             let Some((len, kind)) = header(view) else { return view.len() < RECORD };
@@ -199,18 +202,18 @@ impl Reader {
                     return false;
                 }
             }
-            // The bytes of a number may look like another kind of record, so reading resumes only at data records.
+            // the bytes of a number may look like another kind of record, so reading resumes only at data records
             if kind != b'D' && undeclared == Undeclared::Refused {
                 return false;
             }
-            // A record cut off by the window or the end of the file is judged by its first bytes.
+            // if the view ends within a record, only the existing bytes of the record are checked
             let Some(rest) = view.get(len..) else { return undeclared == Undeclared::Allowed };
             view = rest;
         }
         true
     }
 
-    /// Whether a data record of `len` bytes has the size of the topic that it names.
+    /// Whether the data record at the beginning of `view`, of `len` bytes, has the size of its topic.
     fn fits(&self, view: &[u8], len: usize) -> bool {
         let number = view.get(RECORD..).and_then(|b| b.first_chunk());
         let known = number.and_then(|b| self.subscriptions.get(u16::from_le_bytes(*b)));
@@ -302,7 +305,7 @@ impl Reader {
         if layout.fields.is_empty() {
             return;
         }
-        // A short record is left out, because its sample would take many times its size in memory.
+        // a short record is damaged; its sample would also need much more memory than the record
         if body.len() < layout.size {
             self.short += 1;
             return;
@@ -325,7 +328,7 @@ impl Reader {
         self.series.at(place).push(micros * 1e-6, &self.values);
     }
 
-    /// Adds the records of a subscription that ends to the count of its topic.
+    /// Adds the number of data records of the subscription `old`, which has ended, to the count of its topic.
     fn count(&mut self, old: Subscription) {
         *self.out.counts.entry(old.key).or_default() += old.count;
     }
@@ -365,7 +368,7 @@ impl Reader {
     }
 }
 
-/// Finding about a damaged file; `None` if no byte was skipped. `holes` are the lost times, s.
+/// A finding about a damaged file; `None` if no byte was skipped. `holes` are the times that were lost at each damaged place, s.
 pub(super) fn damage(skipped: usize, holes: &[f64]) -> Option<Finding> {
     let lost: f64 = holes.iter().filter(|s| s.is_finite()).sum();
     (skipped > 0).then(|| {

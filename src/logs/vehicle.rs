@@ -1,4 +1,4 @@
-//! Type of the vehicle and its times of wing-borne flight, from the log's own records.
+//! Type of the vehicle, and the times in which it does not fly on its wings, from the log's own records.
 //!
 //! Sources: MAV_TYPE of HEARTBEAT, vtol_state of EXTENDED_SYS_STATE (MAVLink common.xml); vehicle_status and
 //! vtol_vehicle_status (PX4 msg/); Q_ENABLE, Q_TILT_MASK, FRAME_CLASS, SERVOn_FUNCTION 33 to 40, the mode numbers 17 to
@@ -35,17 +35,17 @@ impl Kind {
     }
 }
 
-/// A vehicle type with its evidence.
+/// A vehicle type, with the record that shows it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Vehicle {
     /// Type of the vehicle.
     pub kind: Kind,
-    /// Record of the log that shows the type.
+    /// Name of the log's record that shows the type.
     pub by: String,
 }
 
 impl Vehicle {
-    /// Why a log of this vehicle cannot be studied; `None` for an aircraft with wings.
+    /// Reason for which a log of this vehicle cannot be studied; `None` for an aircraft with wings.
     pub fn refusal(&self) -> Option<String> {
         let what = match self.kind {
             Kind::FixedWing | Kind::Vtol => return None,
@@ -59,7 +59,7 @@ impl Vehicle {
     }
 }
 
-/// The vehicle of a log; `None` where no record shows it.
+/// The vehicle of a log; `None` if no record shows its type.
 pub(super) fn vehicle(format: Format, topics: &Topics) -> Option<Vehicle> {
     match format {
         Format::Csv => None,
@@ -74,7 +74,7 @@ fn found(kind: Kind, by: impl Into<String>) -> Option<Vehicle> {
     Some(Vehicle { kind, by: by.into() })
 }
 
-/// Kind of vehicle of a MAV_TYPE; `None` if the type is not a vehicle.
+/// Kind of vehicle of the MAV_TYPE `number`; `None` for other types, such as a ground station.
 fn by_type(number: f64) -> Option<Kind> {
     Some(match number as i64 {
         1 | 16 | 28 => Kind::FixedWing,
@@ -124,7 +124,7 @@ fn ardupilot(topics: &Topics) -> Option<Vehicle> {
         return found(Kind::Vtol, "Q_ENABLE");
     }
     let firmware = topics.firmware.split_whitespace().next().unwrap_or_default();
-    // Only builds for helicopters have the parameters of a swash plate, with an older or a newer name.
+    // Only firmware for helicopters has parameters of a swash plate. Their names depend on the version.
     let swash = |name: &String| name.starts_with("H_SV") || name.starts_with("H_SW_");
     let rotor = topics.parameters.keys().any(swash);
     match firmware {
@@ -155,7 +155,7 @@ fn telemetry(topics: &Topics) -> Option<Vehicle> {
         else {
             continue;
         };
-        // MAV_AUTOPILOT_INVALID (8) marks a camera, a gimbal or a companion.
+        // MAV_AUTOPILOT_INVALID (8) marks a component without an autopilot, such as a camera or a gimbal.
         let of_autopilot = types.iter().zip(autopilots).filter(|(_, a)| **a != 8.0);
         kinds.extend(of_autopilot.filter_map(|(t, _)| Some((by_type(*t)?, *t))));
     }
@@ -178,12 +178,13 @@ fn telemetry(topics: &Topics) -> Option<Vehicle> {
 
 /// Mode numbers of ArduPlane in which the aircraft hovers.
 const HOVER_MODES: [f64; 8] = [17.0, 18.0, 19.0, 20.0, 21.0, 22.0, 23.0, 25.0];
-/// Throttle of the lift motors (0..1) above which they count as carrying the aircraft.
+/// Throttle of the lift motors (0..1) above which they count as carrying the aircraft. For servo pulses, the limit is three
+/// times as large.
 const CARRIES: f64 = 0.05;
-/// Time for which a record of QTUN is taken to hold, s. QTUN is written while the lift motors may run.
+/// Time for which a QTUN record is taken to hold, s. ArduPlane writes QTUN records while the lift motors may run.
 const QTUN_HOLDS_S: f64 = 0.5;
 
-/// Intervals outside wing-borne flight: from, to, s.
+/// Intervals of hover or transition (from, to, s), in which the aircraft does not fly on its wings alone.
 pub(super) fn hovers(format: Format, topics: &Topics) -> Vec<(f64, f64)> {
     let mut spans = Vec::new();
     match format {
@@ -237,14 +238,14 @@ fn held(series: Option<(&[f64], &[f64])>, is: impl Fn(f64) -> bool) -> Vec<(f64,
     merged(spans.map(|((from, to), _)| (*from, to)).collect())
 }
 
-/// Intervals (from, to, s) in which QTUN shows throttle on the lift motors.
+/// Intervals (from, to, s) in which QTUN records show that the lift motors carry the aircraft.
 fn lift_by_qtun(topics: &Topics) -> Vec<(f64, f64)> {
     let Some((times, throttle)) = topics.series("QTUN", "ThO") else { return Vec::new() };
     let carries = times.iter().zip(throttle).filter(|(_, x)| **x > CARRIES);
     merged(carries.map(|(t, _)| (*t, t + QTUN_HOLDS_S)).collect())
 }
 
-/// Intervals (from, to, s) in which the servo pulses drive lift motors that do not tilt forward.
+/// Intervals (from, to, s) in which the servo pulses show that lift motors that cannot tilt forward carry the aircraft.
 fn lift_by_pulses(topics: &Topics) -> Vec<(f64, f64)> {
     let tilting = topics.parameter("Q_TILT_MASK").unwrap_or(0.0) as u32;
     let least = topics.parameter("Q_M_PWM_MIN").filter(|x| *x > 0.0).unwrap_or(1000.0);
@@ -262,7 +263,7 @@ fn lift_by_pulses(topics: &Topics) -> Vec<(f64, f64)> {
     merged(spans)
 }
 
-/// Joins the hovers that are separated by less than `shortest_s` (s), because no wing-borne flight is that short.
+/// Joins intervals of hover that are separated by at most `shortest_s` (s), because wing-borne flight lasts longer.
 pub(super) fn joined(hovers: Vec<(f64, f64)>, shortest_s: f64) -> Vec<(f64, f64)> {
     let longer = hovers.into_iter().map(|(from, to)| (from, to + shortest_s)).collect();
     merged(longer).into_iter().map(|(from, to)| (from, to - shortest_s)).collect()

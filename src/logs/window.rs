@@ -1,8 +1,8 @@
-//! Buffered window on a file: binary logs are read record by record and are never held in memory completely.
+//! A buffered window on a file. With it, binary logs are read record by record and are never held in memory completely.
 
 use std::io::{self, Read};
 
-/// Bytes read at a time.
+/// Number of bytes read at a time.
 const CHUNK: usize = 256 * 1024;
 
 /// A buffered view of the next bytes of a source.
@@ -11,7 +11,7 @@ pub(super) struct Window<'a> {
     bytes: Vec<u8>,
     from: usize,
     ended: bool,
-    /// Why the source could not be read further.
+    /// The error that ended the reading; `None` without an error.
     failed: Option<io::Error>,
 }
 
@@ -21,7 +21,7 @@ impl<'a> Window<'a> {
         Window { source, bytes: Vec::new(), from: 0, ended: false, failed: None }
     }
 
-    /// The next bytes of the source: at least `wanted`, fewer only at its end.
+    /// Returns the next bytes of the source: at least `wanted` bytes, or fewer at the end of the source.
     pub fn view(&mut self, wanted: usize) -> &[u8] {
         if self.bytes.len() - self.from < wanted && !self.ended {
             self.fill(wanted);

@@ -1,4 +1,5 @@
-//! Excitations for system identification, which are added to a target or a command.
+//! Excitations for system identification: signals that are added to a command or a target during a step of a flight-test
+//! schedule.
 
 use std::f64::consts::TAU;
 
@@ -8,7 +9,8 @@ use greylag_num::stream::stream;
 
 /// Number of sines in a multisine.
 const LINES: usize = 7;
-/// Fade-in and fade-out time of a multisine, s. It avoids steps at the ends, which would be additional excitations.
+/// Fade-in and fade-out time of a multisine, s. Without fading, the signal would step at its ends, which would excite the
+/// aircraft in addition.
 const FADE_S: f64 = 0.25;
 
 /// The excited command or target.
@@ -31,7 +33,7 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// All axes.
+    /// All axes that can be excited.
     pub const ALL: [Axis; 7] = [
         Axis::Aileron,
         Axis::Elevator,
@@ -59,26 +61,27 @@ impl Axis {
 /// Waveform of an excitation with unit amplitude.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
-    /// +1 for `width` (s).
+    /// A rectangular pulse: +1 for `width` (s).
     Step {
         /// Duration, s. If infinite, the excitation lasts to the end of the schedule's step.
         width: f64,
     },
-    /// +1, then −1, each for `width` (s).
+    /// A doublet: +1, then −1, each for `width` (s).
     Doublet {
         /// Duration of each part, s.
         width: f64,
     },
-    /// A 3-2-1-1: +1 for three, −1 for two, +1 for one and −1 for one times `width` (s).
+    /// A 3-2-1-1: +1 for 3 `width`, −1 for 2 `width`, +1 for `width`, −1 for `width` (s).
     ThreeTwoOneOne {
         /// The unit duration, s.
         width: f64,
     },
-    /// A sum of sines from `low` to `high` (Hz) with random phases and the power of one sine of amplitude 1.
+    /// A sum of sines with frequencies from `low` to `high` (Hz) and random phases. Its power is that of one sine of amplitude
+    /// 1.
     Multisine {
-        /// Lowest frequency, Hz.
+        /// Lowest frequency of the band, Hz.
         low: f64,
-        /// Highest frequency, Hz.
+        /// Highest frequency of the band, Hz.
         high: f64,
         /// Seed of frequencies and phases. Multisines of different seeds are independent.
         seed: u64,
@@ -104,7 +107,7 @@ impl Shape {
 /// An excitation of one axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Excitation {
-    /// The excited axis.
+    /// The axis that is excited.
     pub axis: Axis,
     /// Amplitude in the axis's unit. A negative amplitude reverses the sign.
     pub amplitude: f64,
@@ -114,17 +117,18 @@ pub struct Excitation {
     pub shape: Shape,
     /// Fraction (0..=1) of the controller's reaction on this axis that is applied during the excitation. The reaction is the
     /// change of the controller's command since the start of the excitation. With the full reaction, a good controller would
-    /// cancel the excitation before the aircraft has responded.
+    /// cancel the excitation before the aircraft responds.
     pub authority: f64,
 }
 
 impl Excitation {
-    /// `shape` on `axis` with `amplitude` (the axis's unit), from `start` (s) after the start of the schedule's step.
+    /// Makes an excitation of `axis`. `amplitude` is in the axis's unit. `start` (s) counts from the start of the schedule's
+    /// step. The controller's reaction is applied in full.
     pub fn new(axis: Axis, amplitude: f64, start: f64, shape: Shape) -> Excitation {
         Excitation { axis, amplitude, start, shape, authority: 1.0 }
     }
 
-    /// The same excitation with only the fraction `authority` (0..=1) of the controller's reaction.
+    /// The same excitation, with only the fraction `authority` (0..=1) of the controller's reaction applied.
     pub fn against(self, authority: f64) -> Excitation {
         Excitation { authority, ..self }
     }

@@ -1,4 +1,5 @@
-//! Schedule files: TOML with steps and excitations. Each key ends with its unit.
+//! Schedule files in TOML. A schedule is a flight-test plan: steps with a target attitude and airspeed, and excitations (test
+//! inputs) that are added to targets or commands. The name of a key ends with its unit.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -59,7 +60,7 @@ struct StepFile {
     excitation: Vec<ExcitationFile>,
 }
 
-/// An excitation in the file. The required keys depend on axis and shape.
+/// An excitation in the file. Which keys are required depends on the axis `on` and the shape.
 #[derive(Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct ExcitationFile {
@@ -108,7 +109,7 @@ impl Schedule {
         Schedule::new(named(file.name)?, file.description, steps)
     }
 
-    /// The text of a schedule file from which `Schedule::parse` reads the same schedule.
+    /// The schedule as the text of a file. [`Schedule::parse`] reads the same schedule from it.
     pub fn to_toml(&self) -> String {
         let quoted = |text: &str| toml::Value::String(text.into()).to_string();
         let mut out = format!("schema = 1\nname = {}\n", quoted(&self.name));
@@ -134,7 +135,7 @@ impl Schedule {
     }
 }
 
-/// An angle rounded to 1e-9°, which removes the rounding error of the conversion from radians.
+/// Rounds an angle in degrees to 1e-9°. This removes the rounding error of its conversion from radians.
 fn tidy(degrees: f64) -> f64 {
     (degrees * 1e9).round() / 1e9
 }
@@ -183,7 +184,7 @@ impl ExcitationFile {
         Ok(excitation.against(self.authority.unwrap_or(1.0)))
     }
 
-    /// The amplitude in the axis's unit (angles in rad), from the key for this axis.
+    /// The amplitude from the key that belongs to `axis`, in the unit of the axis: rad, m/s, or a fraction of full command.
     fn amplitude(&self, axis: Axis) -> Result<f64, String> {
         let all = [
             ("amplitude", self.amplitude),
@@ -243,7 +244,7 @@ impl ExcitationFile {
     }
 }
 
-/// Checks that `steps` are within the bounds of a schedule. The error describes the first fault and names its step by number.
+/// Checks that `steps` are within the bounds of a schedule. The error describes the first fault and gives the number of its step.
 pub(super) fn check(steps: &[Step]) -> Result<(), String> {
     if steps.is_empty() {
         return Err(
@@ -294,7 +295,7 @@ fn check_step(step: &Step) -> Result<(), String> {
         within(&format!("amplitude on {}", e.axis.name()), e.amplitude, -most, most)?;
         within("start_s", e.start, 0.0, step.duration)?;
         within("authority", e.authority, 0.0, 1.0)?;
-        // an excitation of the shape "step" or "multisine" may last to the end of the schedule's step
+        // the length of a shape "step" or "multisine" may be infinite: it then lasts to the end of the schedule's step
         let pulses = matches!(e.shape, Shape::Doublet { .. } | Shape::ThreeTwoOneOne { .. });
         if pulses || e.length() != f64::INFINITY {
             within("width_s of the whole excitation", e.length(), 0.01, step.duration - e.start)?;
@@ -303,7 +304,7 @@ fn check_step(step: &Step) -> Result<(), String> {
     Ok(())
 }
 
-/// Smallest and largest airspeed target of a step with its excitations, m/s.
+/// Smallest and largest airspeed target (m/s) that a step can reach with its excitations.
 fn farthest_airspeeds(step: &Step) -> [f64; 2] {
     let mut farthest = [step.target.airspeed; 2];
     for e in step.excitations.iter().filter(|e| e.axis == Axis::Airspeed) {

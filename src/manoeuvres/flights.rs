@@ -66,7 +66,7 @@ fn drawn(
     Schedule { name: name.into(), description: about.into(), steps }
 }
 
-/// Adds small sines on aileron, elevator and throttle to a step.
+/// Adds small multisines on aileron, elevator and throttle to a step.
 fn shake(step: &mut Step, draw: &mut Draw) {
     let amplitudes = [(Aileron, 0.035), (Elevator, 0.03), (Throttle, 0.08)];
     for (axis, amplitude) in amplitudes {
@@ -75,7 +75,7 @@ fn shake(step: &mut Step, draw: &mut Draw) {
     }
 }
 
-/// A step with a 3-2-1-1 on `axis` at the airspeed `v` (m/s).
+/// A step with a 3-2-1-1 manoeuvre on `axis` at the airspeed `v` (m/s).
 fn three211(draw: &mut Draw, axis: Axis, amplitude: f64, v: f64) -> Step {
     let shape = Shape::ThreeTwoOneOne { width: draw.within(0.2, 0.3) };
     let amplitude = draw.about(amplitude) * draw.side();

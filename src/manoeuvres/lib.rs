@@ -1,4 +1,5 @@
-//! Flight-test schedules: attitudes and airspeeds to be held, with excitations for system identification.
+//! Flight-test schedules: attitudes and airspeeds to be held, with excitations for system identification. An excitation is a test
+//! signal that is added to a command or to a target.
 //!
 //! A schedule is a pure function of time: [`Schedule::at`] returns the target and the excitation at a time. [`Scheduled`] is a
 //! controller that flies a schedule. [`Overlay`] adds a schedule's excitation to a command. [`menu`] has standard manoeuvres
@@ -21,8 +22,8 @@ use greylag_physics::Command;
 pub const ROLL_MAX_DEG: f64 = 70.0;
 /// Largest |pitch angle| of a schedule, degrees.
 pub const PITCH_MAX_DEG: f64 = 35.0;
-/// Smallest and largest airspeed of a schedule, m/s. The smallest is below 0.6 of the cruise airspeed of a slow aircraft, at
-/// which the menu flies its stall.
+/// Smallest and largest airspeed of a schedule, m/s. The stall in [`menu`] commands 0.6 of the cruise airspeed, and the smallest
+/// value allows it for a slow aircraft too.
 pub const AIRSPEED_MPS: [f64; 2] = [2.0, 400.0];
 /// Cruise airspeed of the aircraft for which the menu and the drawn flights are written, m/s.
 pub const CRUISE_MPS: f64 = 20.0;
@@ -65,7 +66,7 @@ pub struct Demand {
     pub target: Target,
     /// Excitation added to the controller's command.
     pub added: Command,
-    /// Fraction (0..=1) of the controller's reaction that is applied, for aileron, elevator, throttle and rudder. The
+    /// For aileron, elevator, throttle and rudder: the fraction (0..=1) of the controller's reaction that is applied. The
     /// reaction is the change of the controller's command since the start of the excitation.
     pub authority: [f64; 4],
 }
@@ -92,7 +93,7 @@ impl Schedule {
     ///
     /// # Errors
     ///
-    /// If there is no step or a value is outside the bounds of this module. The error names the step by its number.
+    /// If there is no step, or a value is outside the bounds in this module. The error states the number of the step.
     pub fn new(
         name: impl Into<String>,
         description: impl Into<String>,
@@ -156,7 +157,7 @@ impl Schedule {
         self
     }
 
-    /// The same schedule with a rudder multisine in every step, drawn from `seed`.
+    /// The same schedule with a rudder multisine added to every step. The multisines are drawn from `seed`.
     pub fn with_rudder(mut self, seed: u64) -> Schedule {
         const AMPLITUDE: f64 = 0.12;
         for (k, step) in self.steps.iter_mut().enumerate() {

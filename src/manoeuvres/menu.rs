@@ -1,9 +1,10 @@
-//! Catalogue of flight-test manoeuvres by name.
+//! Catalogue of flight-test manoeuvres by name. A manoeuvre consists of steps. In a step a controller holds a target, and
+//! excitations such as pulses are added to its commands or its targets.
 
 use crate::excitation::Axis::{self, Aileron, Elevator, Pitch, Roll, Throttle};
 use crate::{Excitation, Schedule, Shape, Step};
 
-/// Airspeeds at which effects that depend on airspeed are excited, m/s.
+/// Airspeeds of the manoeuvres that excite effects that depend on airspeed, m/s.
 const SPEEDS: [f64; 3] = [15.0, 19.0, 24.0];
 
 /// A manoeuvre of the menu.
@@ -17,7 +18,7 @@ pub struct Manoeuvre {
 }
 
 impl Manoeuvre {
-    /// The manoeuvre as a schedule that ends with wings level.
+    /// The manoeuvre as a schedule. A step with wings level is added at the end.
     pub fn schedule(&self) -> Schedule {
         let mut steps = (self.steps)();
         steps.push(Step::hold(2.0, 0.0, 2.0, 18.0));
@@ -29,7 +30,7 @@ impl Manoeuvre {
 pub const TURN: Manoeuvre = Manoeuvre {
     name: "turn",
     description: "A turn onto the opposite heading.",
-    // at a bank of 45° and 19 m/s the turn rate is 30 °/s: a turn of 180° takes 6 s
+    // at a bank of 45° and 19 m/s the turn rate is 30 °/s, so a turn of 180° takes 6 s
     steps: || vec![Step::hold(6.5, 45.0, 5.0, 19.0)],
 };
 
@@ -204,7 +205,7 @@ pub const MENU: &[Manoeuvre] = &[
 ];
 
 /// Slows down into the stall with the nose up and the throttle closed, then lowers the nose. The nose is held up for 3.2 s +
-/// 0.8 s · `depth`. The menu uses a `depth` of 1, the drawn flights use 1.7 to 2.3.
+/// 0.8 s · `depth`. The menu uses a `depth` of 1. Randomly drawn flights use 1.7 to 2.3.
 pub(super) fn stall(depth: f64) -> Step {
     let up = 3.2 + 0.8 * depth;
     let step = Step::hold(up + 2.8, 0.0, 14.0, 12.0).with(pulse(Throttle, -1.0, 0.0, up));
@@ -222,13 +223,15 @@ pub(super) fn push(depth: f64) -> Step {
     ))
 }
 
-/// A 3-2-1-1 on `axis` with the unit duration `width` (s), near level flight at the airspeed `v` (m/s).
+/// A 3-2-1-1 on `axis`: four steps of alternating sign, which last 3, 2, 1 and 1 times `width` (s). The aircraft flies near
+/// level at the airspeed `v` (m/s).
 fn step_3211(axis: Axis, amplitude: f64, width: f64, pitch_deg: f64, v: f64) -> Step {
     let shape = Shape::ThreeTwoOneOne { width };
     Step::hold(7.0 * width + 4.0, 0.0, pitch_deg - 2.0, v).with(loose(axis, amplitude, 1.5, shape))
 }
 
-/// Sines on aileron, elevator and throttle at once, with slow changes of the roll target.
+/// Multisines from `low` to `high` (Hz) on aileron, elevator and throttle at once, and slow changes of the roll target. The
+/// last argument holds the three amplitudes.
 fn multisines(duration: f64, low: f64, high: f64, [a, e, t]: [f64; 3]) -> Vec<Step> {
     let step = Step::hold(duration, 0.0, 3.0, 18.0);
     let step = step.with(sines(Aileron, a, low, high, 1)).with(sines(Elevator, e, low, high, 2));
@@ -236,7 +239,7 @@ fn multisines(duration: f64, low: f64, high: f64, [a, e, t]: [f64; 3]) -> Vec<St
     vec![step.with(sines(Roll, 0.2, 0.1, 0.25, 4))]
 }
 
-/// Doublets of three widths, first on the elevator, then on the aileron.
+/// Doublets (a positive and a negative pulse) of three widths, first on the elevator, then on the aileron.
 fn doublets(amplitude: f64) -> Vec<Step> {
     let on = |axis: Axis| {
         let step = Step::hold(6.0, 0.0, 3.0, 18.0);
@@ -247,31 +250,33 @@ fn doublets(amplitude: f64) -> Vec<Step> {
     vec![on(Elevator), on(Aileron)]
 }
 
-/// Fraction of the controller's reaction that is applied while a surface is excited.
+/// Fraction of the controller's reaction that is applied to a surface while it is excited.
 const LOOSE: f64 = 0.25;
 
-/// `shape` on `axis`. On aileron and elevator the controller's reaction is reduced to [`LOOSE`].
+/// The excitation `shape` on `axis`. On aileron and elevator the controller's reaction is reduced to the fraction [`LOOSE`].
 pub(super) fn loose(axis: Axis, amplitude: f64, start: f64, shape: Shape) -> Excitation {
     let authority = if matches!(axis, Aileron | Elevator) { LOOSE } else { 1.0 };
     Excitation::new(axis, amplitude, start, shape).against(authority)
 }
 
-/// A pulse like that of [`pulse`], but with the controller's full reaction on every axis.
+/// The same pulse as [`pulse`], but with the controller's full reaction on every axis.
 pub(super) fn firm(axis: Axis, amplitude: f64, start: f64, width: f64) -> Excitation {
     Excitation::new(axis, amplitude, start, Shape::Step { width })
 }
 
-/// A pulse of `amplitude` for `width` (s) from `start` (s) on.
+/// A pulse of `amplitude` for `width` (s) from `start` (s) on, with the reduced reaction of [`loose`].
 pub(super) fn pulse(axis: Axis, amplitude: f64, start: f64, width: f64) -> Excitation {
     loose(axis, amplitude, start, Shape::Step { width })
 }
 
-/// A doublet: +`amplitude`, then −`amplitude`, each for `width` (s), from `start` (s) on.
+/// A doublet from `start` (s) on: +`amplitude`, then −`amplitude`, each for `width` (s), with the reduced reaction of
+/// [`loose`].
 pub(super) fn doublet(axis: Axis, amplitude: f64, start: f64, width: f64) -> Excitation {
     loose(axis, amplitude, start, Shape::Doublet { width })
 }
 
-/// A multisine from `low` to `high` (Hz) during the whole step, with the controller's full reaction.
+/// A multisine from `low` to `high` (Hz) during the whole step, with the controller's full reaction. `seed` determines its
+/// frequencies and phases.
 pub(super) fn sines(axis: Axis, amplitude: f64, low: f64, high: f64, seed: u64) -> Excitation {
     Excitation::new(axis, amplitude, 0.0, Shape::multisine(low, high, seed))
 }

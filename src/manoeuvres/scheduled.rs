@@ -1,4 +1,5 @@
-//! A controller that flies a schedule with another controller.
+//! A controller that flies a schedule with another controller. A schedule is a sequence of targets, with excitations of the
+//! controls for system identification.
 
 use crate::{Demand, Schedule};
 use greylag_control::{Controller, Observation, Target};
@@ -15,12 +16,12 @@ pub struct Overlay {
 }
 
 impl Overlay {
-    /// An overlay with `schedule`, which starts at the first `Overlay::demand`.
+    /// An overlay with `schedule`, which starts at the first call of [`Overlay::demand`].
     pub fn new(schedule: Schedule) -> Overlay {
         Overlay { schedule, start: None, held: [None; 4] }
     }
 
-    /// Returns to the state before the start.
+    /// Resets the overlay to its state before the start of the schedule.
     pub fn reset(&mut self) {
         (self.start, self.held) = (None, [None; 4]);
     }
@@ -36,8 +37,9 @@ impl Overlay {
         self.start.is_some_and(|start| now.since(start).as_secs_f64() >= self.schedule.duration())
     }
 
-    /// The controller's command `own` with its reaction reduced and the excitation added as `demand` says. The result is clamped
-    /// to the ranges of the controls.
+    /// Adds the excitation to the controller's command `own`. During an excitation that reduces the controller's reaction, only
+    /// the fraction [`Demand::authority`] of the change of `own` since the start of the excitation is applied. The result is
+    /// clamped to the ranges of the controls.
     pub fn command(&mut self, demand: &Demand, own: Command) -> Command {
         let mut of = |axis: usize, own: f64, added: f64| {
             let share = demand.authority[axis];
@@ -83,7 +85,7 @@ impl Controller for Scheduled {
         self.inner.reset(seed);
     }
 
-    /// Flies the schedule's target and ignores the argument.
+    /// Flies to the schedule's target and ignores the argument `_target`.
     fn command(&mut self, seen: &Observation, _target: &Target) -> Command {
         let demand = self.overlay.demand(seen.time);
         let own = self.inner.command(seen, &demand.target);

@@ -1,4 +1,4 @@
-//! One step of sixteen aircraft at once, in the widest vector registers of the processor.
+//! One model step of sixteen aircraft at once, in the widest vector registers that the processor has.
 
 use crate::{GreyBox, Memory};
 #[cfg(target_arch = "x86_64")]
@@ -10,8 +10,8 @@ use greylag_physics::{Controls, State};
 pub type Block = Lanes<ROW>;
 
 impl GreyBox {
-    /// Advances sixteen aircraft by one [`step`](GreyBox::step). No multiply-add is fused, so that all processors
-    /// give bit-identical results.
+    /// Advances sixteen aircraft at the same `altitude` (m) by one [`step`](GreyBox::step). No multiply-add is fused, so that
+    /// all processors give bit-identical results.
     pub fn step_block(
         &self,
         state: &State<Block>,

@@ -1,7 +1,8 @@
-//! Two ways to evaluate the long equations of motion: by a call of the copy compiled for a scalar type, or inlined.
+//! Two ways to evaluate the equations of motion, which are long functions: by a call of a copy that is compiled once per scalar
+//! type, or inlined into the caller.
 //!
-//! Kernels that are compiled for several instruction sets inline the equations, because a called copy would not use the
-//! kernel's instruction set. In other functions inlining would only increase the program's size and the compile time.
+//! A kernel that is compiled for several instruction sets must inline the equations, because a called copy would not use the
+//! kernel's instruction set. In other functions, inlining would only increase the size of the program and the compile time.
 
 use super::{GreyBox, Residual};
 use greylag_num::Real;
@@ -18,7 +19,7 @@ pub(super) trait Forces: Copy {
         controls: &Controls<R>,
         air: &AirData<R>,
     ) -> (Vector<R>, Vector<R>);
-    /// The residual's contribution to the time derivative of the state, in units of `State` per second.
+    /// Contribution of the learned residual to the time derivative of the state, in units of `State` per second.
     fn learned<R: Real>(
         self,
         residual: &Residual,

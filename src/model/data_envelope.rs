@@ -1,10 +1,11 @@
-//! Envelope of a residual's training data, and the distance of a point from the data.
+//! Envelope of the training data of a residual, the neural network that corrects a model's rates. It gives the distance of a
+//! flight condition from the training data.
 //!
-//! The distance is the square root of a leverage, scaled so that 99.9 % of the training samples lie within 1. The leverage
-//! is x̂ᵀ (X̂ᵀX̂)⁻¹ x̂ of a linear regression over the training samples. Its features x̂ are 1, the network's inputs and the
-//! units of its last hidden layer. The leverage grows if inputs leave the range of the training data, and if units are
-//! active that were hardly active in the training data. The variance of a Bayesian last layer is proportional to the
-//! leverage.
+//! The distance is the square root of a leverage, scaled so that 99.9 % of the training samples have a distance of at most 1.
+//! The leverage of a linear regression over the training samples is x̂ᵀ (X̂ᵀX̂)⁻¹ x̂. Here the features x̂ are 1, the network's
+//! inputs, and the outputs (units) of its last hidden layer. The leverage grows if inputs leave the range of the training data.
+//! It also grows if units are active that were hardly active there. It is proportional to the output variance of a network with
+//! a Bayesian last layer.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -15,23 +16,23 @@ use greylag_num::dense::ON_STACK;
 /// Largest number of features: 1, the inputs and the widest hidden layer.
 const MOST: usize = 1 + INPUTS + ON_STACK;
 
-/// Ridge on the features' second moments, as a fraction of their mean. It is needed because a unit that was never active has
-/// a second moment of zero.
+/// A constant that is added to the second moment of each feature, as a fraction of the mean second moment (ridge). It is needed
+/// because a unit that was never active has a second moment of zero.
 const RIDGE: f64 = 1e-4;
 
-/// Fraction of the training samples that lie within a distance of 1.
+/// Fraction of the training samples whose distance is at most 1.
 const WITHIN: f64 = 0.999;
 
 /// Envelope of training data in the space of a network's features.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DataEnvelope {
-    /// Whitening matrix W, square, in row-major order. The distance of features x̂ is ‖W x̂‖.
+    /// Square matrix W in row-major order. The distance of a point with the features x̂ is ‖W x̂‖.
     whitening: Vec<f32>,
 }
 
 impl DataEnvelope {
-    /// The envelope of `inputs`, the scaled inputs of `network` in the training samples. `None` if there are none or a value
-    /// is not finite.
+    /// The envelope of the training samples. `inputs` are the scaled inputs of `network` in each sample. `None` if there are no
+    /// samples, or a value is not finite.
     pub fn of(network: &Dense, inputs: &[[f64; INPUTS]]) -> Option<DataEnvelope> {
         let all: Vec<DVector<f64>> = inputs
             .iter()
@@ -55,7 +56,7 @@ impl DataEnvelope {
         DataEnvelope::new(scaled.iter().map(|w| *w as f32).collect(), network).ok()
     }
 
-    /// The envelope with the matrix `whitening` (row-major) for `network`.
+    /// The envelope for `network` whose matrix W is `whitening`, in row-major order.
     ///
     /// # Errors
     /// If the size of the matrix differs from the number of the network's features, or an entry is not finite.
@@ -71,7 +72,7 @@ impl DataEnvelope {
         Ok(DataEnvelope { whitening })
     }
 
-    /// Whitening matrix W in row-major order.
+    /// The matrix W in row-major order.
     pub fn whitening(&self) -> &[f32] {
         &self.whitening
     }
@@ -81,7 +82,7 @@ impl DataEnvelope {
         self.whitening.len().isqrt()
     }
 
-    /// Distance of the scaled `inputs` of `network` from the training data. It is at most 1 for 99.9 % of the training samples.
+    /// Distance of a point from the training data. `inputs` are the scaled inputs of `network` at the point.
     pub fn distance(&self, network: &Dense, inputs: &[f64; INPUTS]) -> f64 {
         let (features, count) = features(network, inputs);
         let rows = self.whitening.chunks_exact(count);
@@ -92,7 +93,7 @@ impl DataEnvelope {
     }
 }
 
-/// Features (1, the inputs, the units of the last hidden layer), and the number of features.
+/// The features of a point (1, the inputs, the units of the last hidden layer), and their number.
 fn features(network: &Dense, inputs: &[f64; INPUTS]) -> ([f64; MOST], usize) {
     let mut features = [0.0; MOST];
     features[0] = 1.0;

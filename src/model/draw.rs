@@ -57,7 +57,7 @@ mod tests {
             let values = draws.iter().map(|d| d.coefficients()[i].value - c.value);
             let square = values.map(|x| x * x).sum::<f64>() / draws.len() as f64;
             assert!(square.sqrt() <= 1.15 * c.width(), "{}", c.name);
-            // clamping to a bound may reduce the deviation to one side
+            // clamping to a bound may remove the deviations to one side
             assert!(square.sqrt() >= 0.5 * c.width(), "{}", c.name);
         }
         assert_eq!(model.drawn(7, 3).coefficients(), draws[3].coefficients());

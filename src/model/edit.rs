@@ -1,4 +1,5 @@
-//! Edits of a model file's text: new values and effects, with all other text unchanged.
+//! Edits the text of a model file: sets values of coefficients and adds effects, with all other text unchanged. An effect is one
+//! term of the forces and moments, such as `lift_linear`.
 
 use crate::known::{FlightConstants, Known, SENSORS, TRIMS};
 use greylag_physics::effects::Kind;
@@ -21,7 +22,7 @@ pub enum EditError {
 /// A number that is to be written into a model file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Number {
-    /// Name, `effect.coefficient`, as in the model file.
+    /// Name of the coefficient, written as `effect.coefficient`.
     pub name: String,
     /// Value in the coefficient's unit.
     pub value: f64,
@@ -38,19 +39,20 @@ pub struct Edit {
     pub name: String,
     /// Path of the airframe file, relative to the new model file.
     pub airframe: String,
-    /// New values of existing coefficients.
+    /// New values of coefficients of the model's own effects.
     pub changed: Vec<Number>,
     /// Coefficients of new effects, each with the source of the effect's formula. The coefficients of one effect are adjacent.
     pub added: Vec<(Number, String)>,
-    /// Coefficients set to zero, each with the effect that replaces its term.
+    /// Coefficients that are set to zero, each with the id of the effect that replaces its term.
     pub dropped: Vec<(String, &'static str)>,
-    /// Entries that are replaced by a text: the path of keys from the outermost, and the new text.
+    /// Other entries whose value becomes a text. Each has the path of keys, outermost first, and the text.
     pub replaced: Vec<(&'static [&'static str], &'static str)>,
-    /// Paths of effect files outside the catalogue, relative to the new model file.
+    /// Paths of the effect files (files that define an effect), relative to the new model file.
     pub effect_files: Vec<String>,
-    /// Flights to which the values were fitted, as text for the sources.
+    /// Text that names the flights to which the values were fitted. It becomes part of the `source` of each value.
     pub fitted_to: String,
-    /// Constants of the installation and of flights that replace those in the file. `None` leaves the file's entries unchanged.
+    /// Sensor errors and trims of the installation and of single flights, which replace those in the file. `None` leaves the
+    /// file's entries unchanged.
     pub known: Option<Known>,
 }
 
@@ -58,7 +60,7 @@ impl Edit {
     /// Applies the edit to `text`, the text of a model file. Comments and all other entries are unchanged.
     ///
     /// # Errors
-    /// If the text is not that of a model file, or already has an effect that is to be added.
+    /// If `text` is not that of a model file, lacks a coefficient to be changed, or already has an effect to be added.
     pub fn apply(&self, text: &str) -> Result<String, EditError> {
         let mut document: DocumentMut = text.parse()?;
         for (key, new) in [("name", &self.name), ("airframe", &self.airframe)] {
@@ -193,9 +195,9 @@ fn entry<'a>(effects: &'a mut dyn TableLike, name: &str) -> Result<&'a mut Item,
     item.ok_or_else(|| EditError::Place(format!("effects.{name}")))
 }
 
-/// Finds a coefficient `name` that the model file omits, so that the effect file gives its value. Returns the effect's table
-/// in the model file, the coefficient's short name and the effect's source. `None` if the model file has the coefficient or
-/// no effect file defines it.
+/// For a coefficient `name` that the model file leaves out, because its effect file states the value: the effect's table in the
+/// model file, the name without the effect's id, and the source of the effect. `None` if the model file has the coefficient or no
+/// effect file defines it.
 fn left_to_effect_file<'a, 'b>(
     effects: &'a mut dyn TableLike,
     name: &'b str,
@@ -219,12 +221,12 @@ fn drop_coefficient(effects: &mut dyn TableLike, name: &str, by: &str) -> Result
         replace(old, new);
     }
     table.remove("sd");
-    // bounds of the former value may exclude zero
+    // the bounds may exclude zero
     table.remove("bounds");
     Ok(())
 }
 
-/// The text "greylag amend: " followed by the original source of a coefficient, without the remark of an earlier fit.
+/// The text "greylag amend: " and the original source of a coefficient. What an earlier fit added to `source` is left out.
 fn original(source: &str) -> String {
     let amended = "greylag amend: ";
     let bare = source.strip_prefix(amended).and_then(|s| s.split("; fitted to ").next());
@@ -235,7 +237,7 @@ fn split(name: &str) -> Result<(&str, &str), EditError> {
     name.split_once('.').ok_or_else(|| EditError::Place(name.into()))
 }
 
-/// Replaces the value `old` by `new`. The surrounding spaces and comments are unchanged.
+/// Replaces the value `old` by `new`, without a change of the spaces and comments around it.
 fn replace(old: &mut Value, mut new: Value) {
     *new.decor_mut() = old.decor().clone();
     *old = new;

@@ -1,4 +1,5 @@
-//! Reader of model files. A model file is a TOML file that names the model's effects and states every number with its source.
+//! Reader of model files. A model file is a TOML file with the model's effects (terms of forces, moments, body or actuators)
+//! and their coefficients. It states the source of every number.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -91,15 +92,14 @@ struct TableFile {
 struct GridFile {
     throttle: Vec<f64>,
     airspeed_mps: Vec<f64>,
-    /// The values, with one row per throttle.
+    /// The values, with one row for each throttle and one column for each airspeed.
     value: Vec<Vec<f64>>,
     #[serde(rename = "source")]
     _source: String,
 }
 
 impl GreyBox {
-    /// Reads a model file (`schema = 1`) and the airframe file that it names. The path of the airframe file is relative to the
-    /// model file.
+    /// Reads a model file (`schema = 1`) and the files that it names. Their paths are relative to the model file.
     ///
     /// # Errors
     /// If a file cannot be read, has a syntax error or another schema, names an unknown effect or coefficient, lacks a
@@ -115,7 +115,8 @@ impl GreyBox {
         GreyBox::parse(&text, path)
     }
 
-    /// Parses the text of a model file. `path` is the file's present or intended place, to which other paths are relative.
+    /// Parses the text of a model file and reads the files that it names. `path` is the present or intended path of the model
+    /// file. Paths in the text are relative to it.
     ///
     /// # Errors
     /// The same as for [`GreyBox::load`], except that the model file itself is not read.
@@ -145,8 +146,8 @@ impl GreyBox {
 }
 
 impl GreyBox {
-    /// A model from the texts of a model file and its airframe file, without files on disk. The model has neither a residual
-    /// nor effects from effect files.
+    /// Makes a model from the texts of a model file and its airframe file, without files on disk. The model file must name
+    /// neither a residual (learned network) nor effect files.
     ///
     /// # Errors
     /// If a text has a fault as for [`GreyBox::load`], or names a residual or effect files.
@@ -226,7 +227,7 @@ impl File {
     }
 }
 
-/// Checks that the model has no more input effects, lags and delays than a model's memory can hold.
+/// Checks that the model has no more input effects (between actuators and surfaces), lags and delays than its memory can hold.
 fn can_be_remembered(inputs: usize, terms: &[Term]) -> Result<(), String> {
     if inputs > inputs::MOST {
         return Err(format!(
@@ -281,8 +282,8 @@ impl AirFile {
     }
 }
 
-/// Coefficients and tables of one effect from its TOML table. If the effect has an effect file, missing coefficients take
-/// their values from it.
+/// Coefficients and tables of one effect from its TOML table. If the effect comes from an effect file, coefficients that the
+/// table lacks have the values of that file.
 fn effect(
     about: &Description,
     written: Option<&Written>,
@@ -330,7 +331,8 @@ fn effect(
     Ok((named, points))
 }
 
-/// The coefficient `about` of the effect `id` with the value `number`, checked against its bounds for an aircraft of `size`.
+/// The coefficient `about` of the effect `id` with the value `number`, checked against its bounds. The bounds are those in the
+/// file, or else the physical bounds for an aircraft of `size`.
 fn checked(id: &str, about: &Coefficient, number: &Sourced, size: &Size) -> Result<Named, String> {
     let name = about.name;
     let own = number.bounds.map(|[low, high]| (low, high));

@@ -1,4 +1,4 @@
-//! Forces and moments, accelerations and state rates of a model.
+//! Forces and moments, accelerations and state rates of a model: a sum of physical effects and a learned residual.
 //!
 //! Effects that need only the point of evaluation (state, controls and airflow) are summed first, in separate code, where a
 //! planner spends most of its time. The input of the other effects, [`Base`], is computed only if a model has such effects.
@@ -16,7 +16,7 @@ use greylag_physics::rigid_body::{self, Vector};
 use greylag_physics::{AirData, Channel, Controls, Point, State, Wrench};
 
 /// Number of fixed-point iterations for the effects that depend on the time derivative of the state. Each iteration reduces
-/// the error by at least a factor of two within the bounds of `unsteady_lift`, and by a factor of ten at usual values.
+/// the error by a factor of two or more for any allowed `unsteady_lift`, and by a factor of ten for usual coefficients.
 const RATE_PASSES: usize = 4;
 
 /// The point of evaluation: state, controls and airflow.
@@ -147,7 +147,7 @@ impl GreyBox {
         }
     }
 
-    /// Input of the effects that need more than the point: sums over the other effects.
+    /// Input of the effects that need more than the point: the forces of the other effects, and the rate of the state.
     fn base<R: Real>(&self, place: &Place<R>) -> Base<R> {
         self.with_dependent(place, self.independent_sum(place)).0
     }
@@ -316,7 +316,8 @@ impl GreyBox {
         self.completed(&place, independent, parts, weights).1
     }
 
-    /// Indices of the coefficients of the effects that need more than the point, without shape constants.
+    /// Indices of the coefficients of the effects that need more than the point. Shape constants, in which an effect is
+    /// nonlinear, are omitted.
     #[cfg(feature = "learn")]
     pub fn dependent_coefficients(&self) -> impl Iterator<Item = usize> + '_ {
         self.terms[self.independent..].iter().flat_map(|term| {

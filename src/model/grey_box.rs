@@ -62,7 +62,7 @@ pub(super) struct Term {
     /// Index of the effect's first coefficient in the model's list.
     pub(super) first: usize,
     pub(super) points: Points,
-    /// Values of the effect's shape constants, copied from the coefficients for speed.
+    /// Values of the effect's shape constants (coefficients in which it is nonlinear), copied from the coefficients for speed.
     pub(super) shape: Vec<f64>,
     /// Index of the effect's first lag among the lags of the model.
     pub(super) first_lag: usize,
@@ -75,8 +75,8 @@ impl Term {
     }
 }
 
-/// Grey-box model ṡ = F_p(s, z; θ_p) + F_a(s, z; θ_a), eq. (19) of \[GSFM26\]: physical effects F_p on a rigid body, and
-/// a learned residual F_a.
+/// Grey-box model ṡ = F_p(s, z; θ_p) + F_a(s, z; θ_a), eq. (19) of \[GSFM26\] (T. Guerin et al., 2026): physical effects F_p on a
+/// rigid body, and a learned residual F_a.
 ///
 /// The model has parameters and equations but no flight state. All evaluations take `&self`, so one model can serve
 /// several threads. Units are SI and radians, body axes are FRD. The methods are of four kinds:
@@ -121,18 +121,19 @@ pub struct GreyBox {
     pub integrator: Integrator,
     /// Learned residual F_a. `None` if the model has no residual.
     pub residual: Option<Residual>,
-    /// Effects, sorted by their needs: those that need only the point are first.
+    /// Effects in their order of evaluation: first those that need only the point of evaluation (state, controls and airflow).
     pub(super) terms: Vec<Term>,
-    /// Number of the terms that need only the point.
+    /// Number of the effects that need only the point of evaluation.
     pub(super) independent: usize,
-    /// Input effects, each with the index of its constant, in the order of [`inputs::Kind::ALL`].
+    /// Input effects (effects between measured actuator positions and acting deflections), each with the index of its
+    /// coefficient, in the order of [`inputs::Kind::ALL`].
     pub(super) inputs: Vec<(inputs::Kind, usize)>,
     pub(super) coefficients: Vec<Named>,
-    /// Number of lags and delays in formulas, at most [`LAGS`].
+    /// Number of lags and delays in the formulas of effect files, at most [`LAGS`].
     pub(super) lags: usize,
     /// Whether the aircraft's rudder does not move, because the link has no rudder command.
     pub(super) rudder_is_left: bool,
-    /// Constants of the installation and of single flights, from the model file.
+    /// Constants of the sensor installation and of single flights, from the model file.
     pub known: Arc<Known>,
 }
 
@@ -174,7 +175,7 @@ impl GreyBox {
         &self.bare_body
     }
 
-    /// The largest need among the model's effects, without input effects.
+    /// The most that any effect needs in addition to the point of evaluation. Input effects are not considered.
     pub fn needs(&self) -> Needs {
         self.terms.last().map_or(Needs::Point, |term| term.kind.needs())
     }
@@ -207,7 +208,8 @@ impl GreyBox {
         found.map(|c| c.bounds = Some(bounds)).is_some()
     }
 
-    /// Bounds of the coefficient at index `place`, which the catalogue describes by `about`.
+    /// Bounds of the coefficient with the index `place`: its own, or else the catalogue's for an aircraft of this size. `about`
+    /// is its description in the catalogue.
     pub fn bounds(&self, place: usize, about: &Coefficient) -> (f64, f64) {
         let own = self.coefficients[place].bounds;
         own.map_or_else(|| self.size().bounds(about), |[low, high]| (low, high))
@@ -219,7 +221,7 @@ impl GreyBox {
         self
     }
 
-    /// Descriptions of the model's effects.
+    /// Descriptions of the model's effects, including its input effects.
     pub fn effects(&self) -> impl Iterator<Item = Description> {
         let inputs = self.inputs.iter().map(|(kind, _)| kind.describe());
         self.terms.iter().map(|term| term.kind.describe()).chain(inputs)
@@ -245,7 +247,8 @@ impl GreyBox {
         self.terms.iter().filter_map(|t| Some((t.kind.describe().id, t.points.table.as_ref()?)))
     }
 
-    /// For each coefficient, in the order of `coefficients`, whether the model is linear in it.
+    /// For each coefficient, in the order of `coefficients`, whether the forces and moments of its effect are linear in it.
+    /// Shape constants and coefficients of input effects are not.
     pub fn linear(&self) -> Vec<bool> {
         let mut linear = vec![false; self.coefficients.len()];
         for Term { kind, first, .. } in &self.terms {
@@ -255,8 +258,7 @@ impl GreyBox {
         linear
     }
 
-    /// Sorts the effects into their order of evaluation, then recomputes all quantities that depend on the
-    /// coefficients.
+    /// Sorts the effects into their order of evaluation, then recomputes all values that depend on the coefficients.
     pub(super) fn settle(&mut self) {
         self.terms.sort_by_key(|term| (term.kind.needs(), term.kind.describe().id));
         self.independent = self.terms.partition_point(|term| term.kind.needs() == Needs::Point);
@@ -280,8 +282,7 @@ impl GreyBox {
         }
     }
 
-    /// Converts the measured positions `controls` to the acting deflections. To be called once every
-    /// [`STEP`](crate::STEP).
+    /// Converts the measured positions `controls` to the acting deflections. A run calls it once every [`STEP`](crate::STEP).
     #[inline(always)]
     pub fn act<R: Real>(&self, controls: &Controls<R>, memory: &mut InputMemory<R>) -> Controls<R> {
         let mut acting = *controls;
@@ -306,7 +307,7 @@ impl GreyBox {
         InputMemory::at_rest(controls, lagged)
     }
 
-    /// Calls `of` with the index of each lag and delay of the formulas, the lag or delay, and the shape constants of its
+    /// Calls `of` for each lag and delay of the formulas, with its index, the lag or delay, and the shape constants of its
     /// effect.
     #[inline(always)]
     fn each_lag(&self, mut of: impl FnMut(usize, &Memory, &[f64])) {
@@ -318,7 +319,7 @@ impl GreyBox {
         }
     }
 
-    /// Whether the measured positions are the acting deflections: the model has neither input effects nor lags.
+    /// Whether the acting deflections equal the measured positions, because the model has neither input effects nor lags.
     pub fn acts_at_once(&self) -> bool {
         self.inputs.is_empty() && self.lags == 0
     }

@@ -19,12 +19,13 @@ pub const STEP: f64 = 0.01;
 pub enum Integrator {
     /// Classical fourth-order Runge–Kutta, as in \[GSFM26\].
     Rk4,
-    /// JSBSim's default (`FGPropagate`): rates and attitude by explicit Euler, velocity by Adams–Bashforth 2 in earth
-    /// axes. The scheme stores the last acceleration.
+    /// JSBSim's default (`FGPropagate`): body rates and attitude by explicit Euler, velocity by Adams–Bashforth 2 in earth axes.
+    /// The scheme stores the last acceleration.
     Jsbsim,
 }
 
-/// Memory of [`Integrator::Jsbsim`]: the last acceleration in the horizon frame, m/s². `None` at the start of a run.
+/// Memory of [`Integrator::Jsbsim`]: the last acceleration in the horizon frame (m/s²), which is level and turns with the
+/// heading. `None` at the start of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Memory<R = f64>(Option<Vector<R>>);
 
@@ -36,8 +37,8 @@ impl<R> Default for Memory<R> {
 }
 
 impl<R: Real> Memory<R> {
-    /// Selects `then` in the SIMD lanes in which `chosen` is above zero, and this memory in the others. If one of the two
-    /// memories is empty, selects the other one.
+    /// Merges two memories: takes `then` in the SIMD lanes in which `chosen` is above zero, and this memory in the other lanes.
+    /// If one of the two memories is empty, the other one is taken in all lanes.
     #[inline(always)]
     pub fn replaced(&self, chosen: R, then: &Self) -> Self {
         let (Some(mut all), Some(then)) = (self.0, then.0) else {
@@ -62,7 +63,7 @@ impl<R: Copy> Memory<R> {
 }
 
 impl GreyBox {
-    /// The state one [`STEP`] later, with constant controls at `altitude` (m).
+    /// Returns the state one [`STEP`] later, with constant controls at `altitude` (m). `memory` is updated.
     pub fn step<R: Real>(
         &self,
         state: &State<R>,
@@ -110,7 +111,7 @@ impl GreyBox {
         forces: impl Forces,
     ) -> State<R> {
         let (mut at, mut next) = (*s, *s);
-        // for each slope, in s: the step to the next stage, and the weight in the final sum
+        // for each stage: step from `s` to the next stage, and weight of the slope in the sum, both in s
         let stages = [
             (STEP / 2.0, STEP / 6.0),
             (STEP / 2.0, STEP / 3.0),
@@ -229,14 +230,15 @@ fn euler_step_attitude<R: Real>(s: &State<R>) -> (R, R, R) {
 /// A complete simulated aircraft: state, actuator filters, altitude and the model's memories.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Twin {
-    /// Flight state.
+    /// State of the flight.
     pub state: State,
     /// Actuator filters with their memories.
     pub actuators: Actuators,
     /// Altitude above mean sea level, m.
     pub altitude: f64,
     memory: Memory,
-    /// Memory of input effects and lags. `None` before the first step: the controls are then at rest.
+    /// Memory of the model's input effects (between actuators and surfaces) and lags. `None` before the first step, which starts
+    /// from a steady state.
     inputs: Option<InputMemory>,
 }
 
@@ -252,8 +254,8 @@ impl Twin {
         Twin { state, actuators, altitude, memory: Memory::default(), inputs: None }
     }
 
-    /// Advances by one [`STEP`] in the order of JSBSim. First the state is integrated with the present actuators, then the
-    /// actuators receive the command.
+    /// Advances by one [`STEP`] in still air, in the order of JSBSim. First the state is integrated with the present actuator
+    /// positions, then the actuators respond to the command.
     pub fn step(&mut self, model: &GreyBox, command: &Command) {
         let air = model.air(&self.state, self.altitude);
         let velocity = rigid_body::air_velocity(&self.state, &air);

@@ -1,14 +1,14 @@
-//! Jacobians by forward-mode differentiation, four inputs at a time.
+//! Jacobians by forward-mode automatic differentiation, with respect to four inputs at a time.
 //!
-//! Four derivatives fill a vector register. The model's equations are compiled only for this number of derivatives, because
-//! each further number adds seconds to the compilation. The number does not change a derivative by a single bit.
+//! Four derivatives fill a SIMD register. The model's equations are compiled for this number only, because each further number
+//! adds seconds to the compilation. The values of the derivatives do not depend on the number.
 
 use greylag_num::{Dual, Real};
 
 /// A number with its derivatives with respect to four inputs.
 pub(super) type Four = Dual<4>;
 
-/// Values of `f` at `x`, and its Jacobian. Row i holds ∂fᵢ/∂xⱼ for all j.
+/// The value of `f` at `x`, and the Jacobian of `f` there. Row i of the Jacobian holds ∂fᵢ/∂xⱼ for all j.
 pub(super) fn jacobian<const N: usize, const M: usize>(
     x: &[f64; N],
     f: impl Fn([Four; N]) -> [Four; M],

@@ -1,4 +1,4 @@
-//! Addition of an effect to a model.
+//! Addition of a physical effect (terms of forces and moments, with coefficients) to a model.
 
 use super::grey_box::{Points, Term};
 use super::{GreyBox, Named};
@@ -43,7 +43,7 @@ pub enum JoinError {
         /// Values that were given.
         values: Vec<f64>,
     },
-    /// The model would have too many input effects.
+    /// The model would have too many input effects, which act between the actuators and the surfaces.
     #[error(
         "model {model} has {most} effects between actuators and surfaces already, which is the most"
     )]
@@ -126,9 +126,9 @@ impl GreyBox {
         self.effects().find(|about| gone && about.replaces.contains(&name)).map(|about| about.id)
     }
 
-    /// [`join`](GreyBox::join) with the largest fraction of `values` for which the change of the body
-    /// [is acceptable](greylag_physics::rigid_body::RigidBody::may_become). The fraction is a whole number of percent. It is
-    /// 100 % unless an estimate of mass or inertia overshoots.
+    /// Adds an effect like [`join`](GreyBox::join). All `values` are scaled by the largest whole number of percent for which the
+    /// change of mass and inertia [is acceptable](greylag_physics::rigid_body::RigidBody::may_become). This is 100 % unless an
+    /// estimate of mass or inertia overshoots.
     ///
     /// # Errors
     /// The same as for [`join`](GreyBox::join).

@@ -1,4 +1,4 @@
-//! Export of a model as a JSBSim aircraft.
+//! Exports a model as the files of a JSBSim aircraft.
 
 mod aerodynamics;
 mod conditions;
@@ -14,21 +14,21 @@ use greylag_physics::airframe::ActuatorFigures;
 use greylag_physics::rigid_body::ForceAxes;
 use greylag_physics::servos::Surface;
 
-/// Pound of force, N.
+/// Pound of force in newtons.
 const LBF: f64 = 4.448_221_615_260_5;
-/// Foot, m.
+/// Length of a foot, m.
 const FT: f64 = 0.3048;
-/// Pound of mass, kg.
+/// Pound of mass in kilograms.
 const LB: f64 = 0.453_592_37;
-/// Slug foot squared, kg m².
+/// Slug times foot squared, kg m².
 const SLUG_FT2: f64 = 1.355_817_948_331_4;
 
-/// Files of an exported aircraft. Their paths are relative to the folder with the aircraft's name.
+/// The files of an exported aircraft. Their paths are relative to the aircraft's folder.
 #[derive(Clone, Debug)]
 pub struct Exported {
     /// Path and text of each file.
     pub files: Vec<(String, String)>,
-    /// Properties of the model that the export omits, in words: effects, force axes, residual, rate limits.
+    /// Names of what the export omits: effects, force axes, the learned residual, rate limits.
     pub left_out: Vec<String>,
 }
 
@@ -39,16 +39,16 @@ const ELEVATOR: &str = "fcs/elevator-pos-rad";
 const RUDDER: &str = "fcs/rudder-pos-rad";
 const THROTTLE: &str = "fcs/throttle-pos-norm";
 
-/// Exports `model` as the aircraft `name` in a single condition, that of the model's airframe.
+/// Exports `model` as the aircraft `name`, for a single condition such as one flap setting.
 pub fn export(model: &GreyBox, name: &str) -> Exported {
     written(&Conditions::one(model), name)
 }
 
 /// Exports the aircraft `name` that `models` describe in several conditions, for example flap settings.
 ///
-/// The models differ in their aerodynamic coefficients and in one property of their airframes' `[conditions]`. The
-/// exported aircraft reads this property. Its aerodynamic forces and moments are interpolated between two settings. Beyond
-/// the lowest and highest setting they are constant.
+/// The models differ in their aerodynamic coefficients, and in the value of one JSBSim property in the `[conditions]` of their
+/// airframes. The exported aircraft reads this property. Its aerodynamic forces and moments are interpolated between the
+/// values. Beyond the lowest and the highest value they are constant.
 ///
 /// # Errors
 /// [`ConditionsError`], if the models differ in another quantity, or do not differ in exactly one condition.
@@ -56,7 +56,7 @@ pub fn export_in_conditions(models: &[GreyBox], name: &str) -> Result<Exported, 
     Ok(written(&Conditions::of(models)?, name))
 }
 
-/// Properties of `model` that the export omits.
+/// Names of what the export omits from `model`.
 fn left_out(model: &GreyBox) -> Vec<String> {
     let effect = |full: &str| full.split('.').next().unwrap_or_default().to_owned();
     let known = |name: &str| aerodynamics::knows(name) || engine::knows(name);
@@ -112,7 +112,7 @@ fn document(conditions: &Conditions, name: &str, [motor, thruster]: [&str; 2]) -
         "<?xml version=\"1.0\"?>\n<!-- Written by `greylag aircraft export jsbsim` from the model {}. -->\n\
          <fdm_config name=\"{name}\" version=\"2.0\" release=\"BETA\">\n\n  <metrics>\n    <wingarea unit=\"M2\"> {:?} \
          </wingarea>\n    <wingspan unit=\"M\"> {:?} </wingspan>\n    <chord unit=\"M\"> {:?} </chord>\n",
-        // XML has no double hyphen in a comment
+        // a comment in XML must not contain a double hyphen
         conditions.names().replace("--", "__"),
         geometry.area,
         geometry.span,
@@ -163,7 +163,7 @@ fn controls(conditions: &Conditions, name: &str) -> String {
     out.push_str(&conditions.declaration());
     let apart = model.airframe.mixer.as_ref().and_then(|m| effectors::channels(m, figures));
     out.push_str(&apart.unwrap_or_else(|| usual_surfaces(figures)));
-    // b = k/(2 + k) with k = step/lag
+    // the coefficient b of the throttle's discrete filter is k/(2 + k) with k = step/lag
     let [b, _] = figures.throttle;
     let lag = figures.step * (1.0 - b) / (2.0 * b);
     let _ = write!(
@@ -197,10 +197,10 @@ fn usual_surfaces(figures: &ActuatorFigures) -> String {
     surfaces.into_iter().filter_map(one).collect()
 }
 
-/// Natural frequency (rad/s) and damping ratio of a surface's filter, by the inverse bilinear transform. `step` is in s.
+/// Natural frequency (rad/s) and damping ratio of a surface's discrete filter, by the inverse bilinear transform. `step` is in s.
 fn analogue(surface: &Surface, step: f64) -> [f64; 2] {
     let [b, _, a2] = surface.filter;
-    // b = w²/d, a2 = (4 − 4ζw + w²)/d, d = 4 + 4ζw + w²: 1 + a2 = (8 + 2w²)/d
+    // with w = natural frequency × step: b = w²/d, a2 = (4 − 4ζw + w²)/d, d = 4 + 4ζw + w², so 1 + a2 = (8 + 2w²)/d
     let square = 8.0 * b / (1.0 + a2 - 2.0 * b);
     let w = square.sqrt();
     let d = square / b;

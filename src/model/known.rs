@@ -1,9 +1,9 @@
-//! Constants of a sensor installation and of single flights in a model file.
+//! Constants of a sensor installation and of single flights that a model file states:
 //!
 //! ```toml
-//! [installation]                       # for every flight, unless its own entry states other axes or sensors
+//! [installation]                       # holds for every flight whose own entry does not state axes or sensors
 //! source = "greylag amend: 3 flights"
-//! axes_deg = [0.0, -9.2, 0.0]          # roll, pitch, yaw of the measured axes relative to the body's
+//! axes_deg = [0.0, -9.2, 0.0]          # roll, pitch, yaw of the measured axes relative to the body axes
 //!
 //! [flights."flight-1.csv"]
 //! source = "greylag amend"
@@ -16,52 +16,54 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-/// Names of the trims that a flight may have: offsets of the model's coefficients, and a fraction of the thrust.
+/// Names of the trims of a flight: constants that are added to the model's coefficients in this flight, and a fraction of the
+/// model's thrust that is added to the thrust.
 pub const TRIMS: [&str; 7] = ["CD0", "CL0", "CY0", "Cl0", "Cm0", "Cn0", "thrust_share"];
-/// Names of the sensor errors in the reconstructed state: a fraction of the airspeed, then offsets of body rates, α and
-/// β. Units are in the names.
+/// Names of the constant sensor errors that remain in the reconstructed state: that of the airspeed as a fraction of it, then
+/// those of body rates, α and β in the units of their names.
 pub const SENSORS: [&str; 6] =
     ["airspeed_share", "p_radps", "q_radps", "r_radps", "alpha_rad", "beta_rad"];
-/// Largest rotation of the measured axes from the body axes, degrees. Larger rotations are stated in a mapping's `[board]`.
+/// Largest rotation angle of the measured axes that a model file may state, degrees. The section `[board]` of a mapping file
+/// (see `logs`) states larger ones.
 pub const MOST_DEG: f64 = 30.0;
 
-/// Constants of a flight, or of the installation that flights share. A constant that is not stated is unknown.
+/// Constants of a flight, or of the installation that all flights share. A constant that is not stated is unknown.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FlightConstants {
-    /// Source of the constants.
+    /// Where the constants come from, in words.
     pub source: String,
-    /// The small rotation from body axes to the measured axes, about x, y and z of the body, degrees.
+    /// Rotation angles from the body axes to the measured axes, about body x, y and z, degrees.
     pub axes_deg: Option<[f64; 3]>,
-    /// Values of the trims, dimensionless, in the order of [`TRIMS`]. Always `None` in an installation.
+    /// Values of the trims, dimensionless, in the order of [`TRIMS`]. Always `None` for an installation.
     pub trims: Option<[f64; TRIMS.len()]>,
-    /// Errors of the sensors in the reconstructed state, in the order and units of [`SENSORS`].
+    /// Sensor errors that remain in the reconstructed state, in the order and units of [`SENSORS`].
     pub sensors: Option<[f64; SENSORS.len()]>,
 }
 
-/// Constants of installation and flights in a model file.
+/// The constants that a model file states for the installation and for single flights.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Known {
     /// Constants of the installation. `None` if the file has none.
     pub installation: Option<FlightConstants>,
-    /// Constants of flights, by the flights' names.
+    /// Constants of single flights, by the name of the flight.
     pub flights: BTreeMap<String, FlightConstants>,
 }
 
 impl FlightConstants {
-    /// The rotation of the measured axes, rad. Zero if it is unknown.
+    /// The rotation angles `axes_deg` in rad. Zero if they are unknown.
     pub fn axes_rad(&self) -> [f64; 3] {
         self.axes_deg.unwrap_or_default().map(f64::to_radians)
     }
 }
 
 impl Known {
-    /// Whether the file has no constants of an installation or a flight.
+    /// Whether the file states no such constants.
     pub fn is_empty(&self) -> bool {
         self.installation.is_none() && self.flights.is_empty()
     }
 
-    /// Constants of `flight`. Axes and sensor errors that its entry does not state are those of the installation. `None` if
-    /// the file has neither an entry for the flight nor an installation.
+    /// Constants of `flight`. Axes and sensor errors that its own entry does not state are those of the installation. `None` if
+    /// the file has neither an entry for the flight nor one for the installation.
     pub fn of(&self, flight: &str) -> Option<FlightConstants> {
         let shared = self.installation.as_ref();
         let Some(own) = self.flights.get(flight) else { return shared.cloned() };
@@ -71,13 +73,13 @@ impl Known {
         Some(own)
     }
 
-    /// Whether the file has an entry for `flight`.
+    /// Whether the file has an own entry for `flight`.
     pub fn names(&self, flight: &str) -> bool {
         self.flights.contains_key(flight)
     }
 }
 
-/// Constants in the form of a model file.
+/// Constants as they are written in a model file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ConstantsFile {
@@ -87,7 +89,7 @@ pub(super) struct ConstantsFile {
     sensors: Option<BTreeMap<String, f64>>,
 }
 
-/// Checks the sections `installation` and `flights` of a model file.
+/// Checks the sections `installation` and `flights` of a model file and converts them. The error text names the faulty entry.
 pub(super) fn checked(
     installation: Option<ConstantsFile>,
     flights: BTreeMap<String, ConstantsFile>,
@@ -123,7 +125,7 @@ fn constants(place: &str, written: ConstantsFile) -> Result<FlightConstants, Str
     })
 }
 
-/// The `values` in the order of `names`. Absent values are zero.
+/// The `values` in the order of `names`. Absent values become zero. Refuses unknown names and values outside −1..1.
 fn named<const N: usize>(
     place: &str,
     key: &str,

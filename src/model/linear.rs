@@ -1,4 +1,4 @@
-//! Linear model of one step about a flight condition, with exact derivatives.
+//! Linear model of one time step about a flight condition. Its derivatives are exact, by dual numbers.
 
 use nalgebra::SMatrix;
 
@@ -9,11 +9,11 @@ use greylag_num::{Dual, Real, each};
 use greylag_physics::{Controls, State};
 
 const STATES: usize = 8;
-/// Number of inputs: states and controls.
+/// Number of inputs of a step: eight states and four controls.
 const INPUTS: usize = 12;
 
-/// Linear model of one step of 0.01 s about a condition: δs₊ = a δs + b δz with z = (δa, δe, δt, δr). Units are rad, m/s, rad/s
-/// and throttle 0..1.
+/// Linear model of one step of 0.01 s about a flight condition: δs₊ = a δs + b δz. Here s is the state, s₊ the next state and
+/// z = (δa, δe, δt, δr) the controls. Units are rad, m/s, rad/s and throttle 0..1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Linear {
     /// Jacobian ∂s₊/∂s, with states in the order of eq. (4).
@@ -24,15 +24,15 @@ pub struct Linear {
 
 /// Linearises one step of `model` about `trim` at `altitude` (m).
 ///
-/// The integrator's memory is taken as steady: its last acceleration equals the present one. The controls are the acting
-/// deflections and throttle. The model's input effects (lag, delay, dead zone) are omitted, because they have their own memory.
+/// The integrator remembers the last acceleration, which is taken as equal to the present one. The controls are the acting
+/// deflections and throttle. The model's input effects (lag, delay, dead zone) are omitted, because they have their own states.
 pub fn linearise(model: &GreyBox, trim: &Trim, altitude: f64) -> Linear {
     linearise_step(model, &trim.state, &trim.controls, altitude)
 }
 
 /// Linearises one step of `model` about any state, steady or not, at `altitude` (m).
 ///
-/// No multiply-add is fused. The results of all processors are therefore bit-identical.
+/// No multiply-add is fused, so that all processors give bit-identical results.
 pub fn linearise_step(
     model: &GreyBox,
     state: &State,
@@ -55,7 +55,8 @@ pub fn linearise_step(
     Linear { a, b }
 }
 
-/// Rows of the Jacobian of a step, with all twelve inputs at once. Planners spend most of their time in this function.
+/// The Jacobian of a step, row by row. The derivatives by all twelve inputs are computed at once, because planners spend most of
+/// their time in this function.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn in_avx2(model: &GreyBox, x: &[f64; INPUTS], altitude: f64) -> [[f64; INPUTS]; STATES] {
@@ -80,7 +81,7 @@ pub(super) fn inputs(state: &State, controls: &Controls) -> [f64; INPUTS] {
     x
 }
 
-/// State and controls of an array from [`inputs`].
+/// Splits an array in the order of [`inputs`] into state and controls.
 #[inline(always)]
 pub(super) fn split<R: Copy>(x: [R; INPUTS]) -> (State<R>, Controls<R>) {
     let state = State::from_array([x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7]]);
@@ -88,7 +89,7 @@ pub(super) fn split<R: Copy>(x: [R; INPUTS]) -> (State<R>, Controls<R>) {
     (state, Controls { aileron, elevator, throttle, rudder, lagged: None })
 }
 
-/// The parts of the Jacobian with respect to the states and to the controls.
+/// Splits the Jacobian into its columns for the states and its columns for the controls.
 pub(super) fn matrices(
     rows: [[f64; INPUTS]; STATES],
 ) -> (SMatrix<f64, STATES, STATES>, SMatrix<f64, STATES, 4>) {

@@ -7,16 +7,17 @@ use super::jacobian::jacobian;
 use super::linear::{inputs, matrices, split};
 use super::{GreyBox, Trim, TrimError};
 
-/// Indices of θ, V, q, α and of φ, p, r, β in the state of eq. (4).
+/// Indices of θ, V, q, α and of φ, p, r, β in the state vector s = (φ, θ, V, p, q, r, α, β).
 const LONGITUDINAL: [usize; 4] = [1, 2, 4, 6];
 const LATERAL: [usize; 4] = [0, 3, 5, 7];
 
-/// Continuous-time linear model about a condition: δṡ = a δs + b δz with z = (δa, δe, δt, δr).
+/// Linear model about a trim, in continuous time: δṡ = a δs + b δz. The inputs z are aileron, elevator, throttle and rudder
+/// (δa, δe, δt, δr).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rates {
-    /// Jacobian ∂ṡ/∂s, with states in the order of eq. (4), in units of the state per second, per unit of the state.
+    /// Jacobian ∂ṡ/∂s. The states are φ, θ, V, p, q, r, α, β in SI units and rad.
     pub a: SMatrix<f64, 8, 8>,
-    /// Jacobian ∂ṡ/∂(δa, δe, δt, δr), in units of the state per second, per rad or per unit of throttle.
+    /// Jacobian ∂ṡ/∂z, per rad of deflection or per unit of throttle.
     pub b: SMatrix<f64, 8, 4>,
 }
 
@@ -74,7 +75,7 @@ pub fn rates(model: &GreyBox, trim: &Trim, altitude: f64) -> Rates {
 pub fn modes(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Vec<Mode>, TrimError> {
     let trim = Trim::straight(model, airspeed, altitude)?;
     let a = rates(model, &trim, altitude).a;
-    // the eigenvalue iteration would not end on a NaN
+    // the eigenvalue iteration would not end if the matrix had a NaN
     if !a.iter().all(|x| x.is_finite()) {
         return Err(TrimError {
             model: model.name.clone(),
@@ -155,8 +156,8 @@ mod tests {
         let modes = modes(&model, 25.0, 100.0).unwrap();
         let names: Vec<_> = modes.iter().map(|m| m.name).collect();
         assert_eq!(names, ["short period", "phugoid", "roll", "Dutch roll", "spiral"]);
-        // by Lanchester the phugoid's frequency is sqrt(2) g / V, and the roll time constant from the textbook's damping is
-        // 1/Lp = Jx 4 V / (rho V^2 S b^2 |Clp|), about 0.05 s
+        // Lanchester's approximation of the phugoid's frequency is sqrt(2) g / V. The roll time constant is
+        // 4 Jx / (rho V S b^2 |Clp|), about 0.05 s, with the figures of Beard and McLain's textbook.
         let (phugoid, roll) = (&modes[1], &modes[2]);
         assert!((phugoid.frequency() / (2.0_f64.sqrt() * 9.806 / 25.0) - 1.0).abs() < 0.25);
         let lanchester = 4.0 * 0.8244 / (1.213 * 25.0 * 0.55 * 2.8956 * 2.8956 * 0.51);

@@ -6,8 +6,8 @@ use super::jacobian::{Four, jacobian};
 
 /// Root of `f` near `start`. `None` if the iteration does not converge in 60 steps.
 ///
-/// Convergence means that every residual is below 1e-10. `largest` limits the step of each unknown. Without this limit, a
-/// poor start could leave the region in which the equations are valid.
+/// Convergence means that the magnitude of every residual is below 1e-10. `largest` limits the step of each unknown in one
+/// iteration. Without this limit, the iteration could leave the region in which the equations are valid after a poor start.
 pub(super) fn solve<const N: usize>(
     start: [f64; N],
     largest: [f64; N],

@@ -22,7 +22,8 @@ const PITCH_SPEED: [f64; 2] = [1.0, 12.0];
 /// Plausible products of static thrust and pitch speed per mass, W/kg.
 const POWER: [f64; 2] = [5.0, 5000.0];
 
-/// Units that are often confused: the unit, the index of mass, span or area, and the factor to kg, m or m².
+/// Units that are often confused with kg, m and m²: the unit, the index of mass, span or area, and the factor to the right
+/// unit.
 const SLIPS: [(&str, usize, f64); 8] = [
     ("g", 0, 1e-3),
     ("t", 0, 1e3),
@@ -80,7 +81,7 @@ impl Size {
         Some(format!("{what}: {}", meant.unwrap_or_else(check)))
     }
 
-    /// The property that is implausible for this mass, span and area, in words. `None` if there is none.
+    /// The property that is implausible for this mass, span and area, in words. `None` if all are plausible.
     fn odd(self) -> Option<String> {
         let aspect = self.span * self.span / self.area;
         let loading = self.weight() / self.area / (LINE * self.weight().cbrt());
@@ -155,7 +156,7 @@ mod tests {
 
     #[test]
     fn aircraft_from_foam_glider_to_airliner_are_plausible() {
-        // mass, span, area: a foam glider, the X8, a Cessna 172, Daedalus, a sailplane, a B747, an F-104
+        // mass, span and area of a foam glider, the X8, a Cessna 172, Daedalus, a sailplane, a B747 and an F-104
         for [mass, span, area] in [
             [0.25, 1.0, 0.15],
             [3.364, 2.1, 0.75],
@@ -187,8 +188,8 @@ mod tests {
         let size = Size { mass: 2.1, span: 1.6, area: 0.32 };
         assert_eq!(size.doubt_of_thrust(10.0, 25.0), None);
         assert!(size.doubt_of_thrust(0.5, 25.0).unwrap().contains("9.81 N"));
-        // a pitch speed in km/h is accepted, because some propellers reach the same number in m/s. Ten times this number is
-        // rejected.
+        // a pitch speed in km/h is not detected, because some propellers reach the same number in m/s; ten times this number is
+        // detected
         assert!(size.doubt_of_thrust(10.0, 900.0).unwrap().contains("--pitch-speed-mps"));
     }
 }

@@ -1,4 +1,5 @@
-//! Learned residual F_a(s, z; θ_a), eq. (19) of \[GSFM26\]: a small network that adds to the rates of the physical effects.
+//! The learned residual F_a(s, z; θ_a), eq. (19) of \[GSFM26\]: a small neural network. Its output is added to the state rates
+//! (time derivatives of the state) of the model's physical part.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,19 +15,19 @@ use greylag_num::{Dense, Real};
 use greylag_physics::airframe::{ActuatorFigures, Geometry, Reference};
 use greylag_physics::{Airframe, Controls, State};
 
-/// Inputs of the network: V, p, q, r, α, β, then δa, δe, δt.
+/// Number of inputs of the network: V, p, q, r, α, β, then δa, δe, δt.
 ///
-/// Roll and pitch are not inputs. Attitude acts on the aircraft only through gravity, which the physical part models
-/// exactly. A residual learned in one attitude is therefore valid in every other.
+/// Roll and pitch are not inputs. The attitude acts on the aircraft only through gravity, which the physical part models
+/// exactly. A residual that was learned in one attitude is therefore valid in every other.
 pub const INPUTS: usize = 9;
 
 /// Number of outputs of the network: the rates of the eight states, in units of x_c (eq. 21) per second.
 pub const OUTPUTS: usize = 8;
 
-/// Name of the tensor with the envelope of the training data in a residual's file.
+/// Name of the tensor in a residual's file that describes the envelope of its training data, see [`DataEnvelope`].
 const ENVELOPE: &str = "data_envelope";
 
-/// Learned contribution to the rates of the state.
+/// A learned contribution to the state rates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Residual {
     network: Arc<Dense>,
@@ -34,15 +35,15 @@ pub struct Residual {
     envelope: Option<Arc<DataEnvelope>>,
 }
 
-/// Fixed scales of the network's inputs and outputs. They come from the airframe, not from data. With them the inputs are of
-/// order one in the envelope, and the outputs are in units of x_c of eq. (21).
+/// Fixed scales of the network's inputs and outputs. They come from the airframe, not from data. The scaled inputs are of order
+/// one within the flight envelope. The outputs are in units of x_c, the characteristic scale of each state (eq. 21).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scales {
     /// Offset that is subtracted from each input, in the input's unit.
     pub offset: [f64; INPUTS],
     /// Factor by which each input is multiplied after the offset, in the inverse of the input's unit.
     pub factor: [f64; INPUTS],
-    /// Factor by which each output is multiplied: x_c.
+    /// Factor by which each output is multiplied, x_c.
     pub output: [f64; OUTPUTS],
 }
 
@@ -50,7 +51,7 @@ pub struct Scales {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Origin {
-    /// Schema of the file: [`Origin::SCHEMA`].
+    /// Name and version of the file's format, [`Origin::SCHEMA`].
     pub schema: String,
     /// Fingerprint of the airframe to which the residual belongs, see [`fingerprint`].
     pub airframe: String,
@@ -101,7 +102,7 @@ pub enum ResidualError {
 }
 
 impl Origin {
-    /// Schema that this program reads and writes.
+    /// Name and version of the format that this program reads and writes.
     pub const SCHEMA: &'static str = "greylag.residual/1";
 }
 
@@ -110,8 +111,8 @@ pub fn fingerprint(airframe: &Airframe) -> String {
     hash(fingerprinted(airframe).as_bytes())
 }
 
-/// The text that is hashed. Its form for schema 1 is fixed field by field, because an additional field of an airframe must
-/// not invalidate earlier policies and residuals.
+/// The text from which the fingerprint is computed. Its first part has the fields of schema 1 of the airframe file in a fixed
+/// form, so that policies and residuals stay valid when an airframe gets further fields.
 fn fingerprinted(airframe: &Airframe) -> String {
     let Geometry { area, span, chord } = airframe.geometry;
     let ActuatorFigures { aileron, elevator, throttle, step, .. } = airframe.actuators;
@@ -145,9 +146,9 @@ pub fn hash(bytes: &[u8]) -> String {
 }
 
 impl Scales {
-    /// Scales of an aircraft. Airspeed is relative to V0, in units of V0/4. The rates p, q and r are in units of 0.1, 0.02 and
-    /// 0.05 times their x_c, which are typical of brisk flight. Angles are in units of 0.2 rad (about the stall), deflections in
-    /// units of the largest travel. Throttle is relative to 0.5, in units of 0.5.
+    /// Scales for the aircraft of `airframe`. Airspeed is relative to V0, its x_c, in units of V0/4. The rates p, q and r are in
+    /// units of 0.1, 0.02 and 0.05 times their x_c, which are typical of brisk flight. Angles are in units of 0.2 rad (about the
+    /// stall), deflections in units of the largest travel. Throttle is relative to 0.5, in units of 0.5.
     pub fn new(airframe: &Airframe, x_c: [f64; OUTPUTS]) -> Scales {
         let [_, _, v0, p, q, r, _, _] = x_c;
         let unit = [0.25 * v0, 0.1 * p, 0.02 * q, 0.05 * r, 0.2, 0.2];
@@ -174,7 +175,7 @@ impl Scales {
         x
     }
 
-    /// Rates of the state, in units of [`State`] per second, from the network's outputs.
+    /// The state rates from the network's outputs, in the units of [`State`] per second.
     #[inline(always)]
     pub fn rate<R: Real>(&self, mut outputs: [R; OUTPUTS]) -> State<R> {
         for (x, scale) in outputs.iter_mut().zip(&self.output) {
@@ -185,7 +186,7 @@ impl Scales {
 }
 
 impl Residual {
-    /// A residual with `network` on an aircraft whose reference scale is `x_c`, eq. (21).
+    /// A residual of `network` for the aircraft of `airframe`, whose characteristic scale is `x_c`, eq. (21).
     ///
     /// # Errors
     /// If the network does not have `INPUTS` inputs and `OUTPUTS` outputs, or a layer is too wide.
@@ -205,7 +206,7 @@ impl Residual {
         Ok(Residual { network: Arc::new(network), scales, envelope: None })
     }
 
-    /// The residual with the envelope of `samples`, its training data.
+    /// The same residual with the envelope of its training data `samples`.
     pub fn trained_on<'a>(
         mut self,
         samples: impl Iterator<Item = (&'a State, &'a Controls)>,
@@ -215,8 +216,8 @@ impl Residual {
         self
     }
 
-    /// Distance of a point from the training data. It is at most 1 for 99.9 % of the training samples. Zero if the residual has
-    /// no envelope.
+    /// Distance of the point (`state`, `controls`) from the training data. It is at most 1 for 99.9 % of the training samples.
+    /// Zero if the residual has no envelope.
     pub fn distance(&self, state: &State, controls: &Controls) -> f64 {
         let inputs = self.scales.inputs(state, controls);
         self.envelope.as_ref().map_or(0.0, |e| e.distance(&self.network, &inputs))
@@ -227,7 +228,7 @@ impl Residual {
         &self.network
     }
 
-    /// Contribution to the rates of the state, in units of [`State`] per second.
+    /// Contribution to the state rates, in the units of [`State`] per second.
     #[inline(always)]
     pub fn rate<R: Real>(&self, state: &State<R>, controls: &Controls<R>) -> State<R> {
         self.scales.rate(self.network.evaluate(self.scales.inputs(state, controls)))
@@ -246,7 +247,7 @@ impl Residual {
         weights::to_bytes(&self.network, envelope, origin)
     }
 
-    /// Reads the file of a residual for `airframe`, whose reference scale is `x_c`, eq. (21).
+    /// Reads the file of a residual for `airframe`, whose characteristic scale is `x_c`, eq. (21).
     ///
     /// # Errors
     /// If the file cannot be read, is not a residual, or is a residual of another airframe.
@@ -265,7 +266,7 @@ impl Residual {
             return Err(ResidualError::Airframe { path: path.into(), airframe });
         }
         let whitening = weights::matrix(&bytes, ENVELOPE).map_err(content)?;
-        // a network of another shape must be rejected before its features are computed
+        // this rejects a network of another shape before the envelope is computed with it
         let residual = Residual::new(network, airframe, x_c)?;
         let envelope = whitening.map(|w| DataEnvelope::new(w, &residual.network)).transpose();
         let envelope = envelope.map_err(content)?.map(Arc::new);

@@ -1,8 +1,8 @@
-//! Textbook model of an aircraft from its mass, dimensions and thrust, with realistic standard deviations.
+//! Textbook model of an aircraft, estimated from its mass, dimensions and thrust. Each estimate has a standard deviation.
 //!
 //! Sources are B. Etkin, L. D. Reid, "Dynamics of Flight", 3rd ed., 1996; J. Roskam, "Airplane Design" part V, 1985 (radii
-//! of gyration); \[BM12\]. The factors for roll are taken from the published X8 and Aerosonde, the factors for the elevons
-//! of a flying wing from the X8.
+//! of gyration); \[BM12\], R. W. Beard, T. W. McLain, "Small Unmanned Aircraft", 2012. The factors for roll are taken from
+//! published models of the Skywalker X8 and the Aerosonde, the factors for the elevons of a flying wing from the X8.
 
 mod derivatives;
 
@@ -26,9 +26,9 @@ pub enum Tail {
 pub struct Measures {
     /// Name of the aircraft.
     pub name: String,
-    /// Total mass, kg.
+    /// Total mass of the aircraft, kg.
     pub mass: f64,
-    /// Wing span, m.
+    /// Span of the wing, m.
     pub span: f64,
     /// Area of the wing, m².
     pub area: f64,
@@ -76,7 +76,7 @@ pub(crate) type Section = (&'static str, Vec<Estimate>);
 /// Largest lift coefficient of a small wing.
 const LIFT_MAX: f64 = 1.2;
 
-/// Derived quantities that several coefficients use.
+/// Quantities derived from the measures, in SI units: aspect ratio, mean chord, stall and cruise airspeed, and lift.
 struct Figures {
     aspect: f64,
     chord: f64,
@@ -88,7 +88,7 @@ struct Figures {
     lift: f64,
 }
 
-/// Table `[incidence]` of an airframe file, from the angles of attack (rad) at cruise and at the stall.
+/// Text of the section `[incidence]` of an airframe file, from the angles of attack (rad) at cruise and at the stall.
 pub fn incidence_limits(cruise: f64, stall: f64) -> String {
     let up_to = |share: f64| (cruise + share * (stall - cruise)).max(0.01);
     format!(
@@ -129,14 +129,14 @@ impl Measures {
         self.airframe_of(f.chord, [self.slope(&f), self.zero_lift()], drives)
     }
 
-    /// Cruise airspeed (m/s), and angle of attack at cruise (rad).
+    /// Cruise airspeed (m/s) and angle of attack at cruise (rad).
     pub(crate) fn cruise(&self) -> [f64; 2] {
         let f = self.figures();
         [f.cruise, (f.lift - self.zero_lift()) / self.slope(&f)]
     }
 
-    /// Text of the airframe file with values from another source: the mean chord (m), the lift slope (1/rad) and the lift
-    /// coefficient at α = 0.
+    /// Text of the airframe file with values from another source: the mean chord (m), and in `lift` the lift slope (1/rad) and
+    /// the lift coefficient at α = 0.
     pub(crate) fn airframe_with_chord(&self, chord: f64, lift: [f64; 2]) -> String {
         self.airframe_of(chord, lift, &Drives::HOBBY)
     }
@@ -197,7 +197,7 @@ impl Measures {
         self.model_with(&self.inertia(), sections, description)
     }
 
-    /// The same as `model_of`, with other moments of inertia.
+    /// The same as `model_of`, with the moments of inertia `inertia`.
     pub(crate) fn model_with(
         &self,
         inertia: &[Estimate; 4],
@@ -224,7 +224,8 @@ impl Measures {
         out
     }
 
-    /// Coefficients of α and α² of the induced drag, for a wing with this lift slope (1/rad) and lift coefficient at α = 0.
+    /// Coefficients of α and α² in the induced drag, for a wing with the lift slope `slope` (1/rad) and the lift coefficient
+    /// `zero_lift` at α = 0.
     pub(crate) fn induced_by(&self, slope: f64, zero_lift: f64) -> [f64; 2] {
         let k = 1.0 / induced(&self.figures());
         [2.0 * k * zero_lift * slope, k * slope * slope]
@@ -246,15 +247,15 @@ impl Measures {
         if self.rudder.is_some() {
             effects.push(("rudder_linear", rudder()));
         }
-        // where the errors of these formulas were measured, they replace the stated standard deviations
+        // a standard deviation that was measured on known aircraft replaces the stated one
         for (name, _, width, _) in effects.iter_mut().flat_map(|(_, all)| all.iter_mut()) {
             *width = widths::of(Tool::Textbook, name).unwrap_or(*width);
         }
         effects
     }
 
-    /// Moments of inertia, kg m². The radii of gyration about x, y and z are fractions of half the span, half the length and
-    /// half the mean of both.
+    /// Moments of inertia, kg m². The radius of gyration about x is a fraction of half the span, about y of half the length,
+    /// and about z of half the mean of span and length.
     pub(crate) fn inertia(&self) -> [Estimate; 4] {
         let length =
             if self.tail == Tail::Conventional { 0.7 * self.span } else { 0.35 * self.span };
@@ -277,7 +278,7 @@ fn quoted(text: &str) -> String {
 /// Names of the moments of inertia in a model file.
 const MOMENTS: [&str; 3] = ["jx_kgm2", "jy_kgm2", "jz_kgm2"];
 
-/// Appends estimates as lines of a model file. A standard deviation of zero is omitted.
+/// Appends the estimates to `out` as lines of a model file. A standard deviation of zero is omitted.
 pub fn numbers(out: &mut String, estimates: &[Estimate]) {
     for (name, value, width, source) in estimates {
         // five decimals are too few for the moments of inertia of an aircraft of a few grams
@@ -390,7 +391,7 @@ mod tests {
         let named = |source: &&'static str| of_tail.iter().any(|words| source.contains(words));
         let wing: Vec<_> = sources(Tail::FlyingWing).into_iter().filter(named).collect();
         assert_eq!(wing, [""; 0]);
-        // CLalpha, CLq, CLde, CYbeta, Cmq, Cmde, Cnbeta and Cnr.
+        // These are CLalpha, CLq, CLde, CYbeta, Cmq, Cmde, Cnbeta and Cnr.
         let tail = sources(Tail::Conventional).into_iter().filter(named).count();
         assert_eq!(tail, 8);
     }

@@ -19,7 +19,7 @@ pub struct Trim {
     pub state: State,
     /// Controls that hold the condition.
     pub controls: Controls,
-    /// Remaining rate of the airspeed V̇ if the throttle is at a limit, m/s². Otherwise zero.
+    /// Rate of change of the airspeed V̇, m/s², if the throttle is at a limit and cannot hold the airspeed. Otherwise zero.
     pub acceleration: f64,
 }
 
@@ -131,8 +131,8 @@ fn within_stops(from: impl Fn(f64) -> Option<Trim>, start: f64) -> Option<Trim> 
     from(1.0).filter(holds).or(first)
 }
 
-/// The trim at the throttle where `left` rises through zero, by bisection. Newton's method may oscillate about a kink of a
-/// thrust table. `None` if `left` does not rise through zero between idle and full throttle.
+/// The trim at the throttle at which the quantity `left` of the trim rises through zero, found by bisection. Newton's method
+/// may oscillate about a kink of a thrust table. `None` if `left` does not rise through zero between idle and full throttle.
 fn halved(held: impl Fn(f64) -> Option<Trim>, left: impl Fn(&Trim) -> f64) -> Option<Trim> {
     let [idle, full] = [held(0.0)?, held(1.0)?];
     if !(left(&idle) < 0.0 && left(&full) > 0.0) {
@@ -173,7 +173,7 @@ fn straight_at(model: &GreyBox, airspeed: f64, altitude: f64, throttle: f64) -> 
     Some(Trim { state, controls, acceleration: 0.0 })
 }
 
-/// Treatment of the throttle in the trim of an attitude.
+/// Treatment of the throttle when an attitude is trimmed.
 #[derive(Clone, Copy)]
 enum Thrust {
     /// The throttle is an unknown that holds the airspeed. The value is its initial guess.
@@ -210,7 +210,7 @@ fn solve_attitude(
     thrust: Thrust,
 ) -> Option<Trim> {
     let sideways = Sideways::of(model);
-    // the initial rates are those of a point mass in a coordinated turn, close to the solution
+    // the initial rates are those of a point mass in a coordinated turn, which are close to the solution
     let turn = model.atmosphere.gravity / airspeed * roll.tan();
     let start = [
         0.05,

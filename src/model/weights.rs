@@ -1,4 +1,4 @@
-//! Weights of a dense network as a safetensors file with one metadata entry.
+//! Reads and writes the weights of a dense network as a safetensors file. One metadata entry states the origin of the network.
 
 use std::collections::HashMap;
 
@@ -23,7 +23,7 @@ pub struct Square<'a> {
     pub entries: &'a [f32],
 }
 
-/// Content of a file with the layers of `network`, an optional matrix, and the file's `origin`.
+/// Returns the content of a file with the layers of `network`, an optional square matrix and the origin `origin`.
 ///
 /// # Errors
 /// If safetensors cannot serialise the tensors, or the origin cannot be written as JSON.
@@ -48,15 +48,15 @@ pub fn to_bytes(
             Ok((name.as_str(), TensorView::new(Dtype::F32, shape.clone(), bytes)?))
         })
         .collect::<Result<Vec<_>, SafeTensorError>>()?;
-    // only one entry, because the format writes several in no fixed order, and equal networks must give equal files
+    // only one metadata entry: safetensors writes several entries in no fixed order, but equal networks must give equal files
     let origin = serde_json::to_string(origin)?;
     safetensors::serialize(views, Some(HashMap::from([(METADATA.to_owned(), origin)])))
 }
 
-/// The origin of a file, from its metadata.
+/// Reads the origin from the metadata of a file.
 ///
 /// # Errors
-/// If the bytes are not a safetensors file, or the metadata have no such entry. The error is in words.
+/// If the bytes are not a safetensors file, or the metadata have no valid origin.
 pub fn origin<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
     let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| e.to_string())?;
     let origin = metadata.metadata().as_ref().and_then(|m| m.get(METADATA));
@@ -64,10 +64,10 @@ pub fn origin<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
     serde_json::from_str(origin).map_err(|e| format!("its metadata: {e}"))
 }
 
-/// The network of a file, from the tensors `layers.0.weight`, `layers.0.bias` and so on.
+/// Reads the network of a file from the tensors `layers.0.weight`, `layers.0.bias` and so on.
 ///
 /// # Errors
-/// If a tensor is missing or has a wrong shape or type, or a parameter is not finite. The error is in words.
+/// If a tensor is missing or has a wrong shape or type, or a parameter is not finite.
 pub fn network(bytes: &[u8]) -> Result<Dense, String> {
     let tensors = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
     let (mut sizes, mut parameters) = (Vec::new(), Vec::new());
@@ -98,10 +98,10 @@ pub fn network(bytes: &[u8]) -> Result<Dense, String> {
     Dense::new(&sizes, parameters).map_err(|e| e.to_string())
 }
 
-/// Entries of the matrix `name` of a file, row by row. `None` if the file has no such matrix.
+/// Reads the entries of the matrix `name` of a file, row by row. `None` if the file has no such matrix.
 ///
 /// # Errors
-/// If the bytes are not a safetensors file, or the matrix is not in single precision. The error is in words.
+/// If the bytes are not a safetensors file, or the matrix is not in single precision.
 pub fn matrix(bytes: &[u8], name: &str) -> Result<Option<Vec<f32>>, String> {
     let tensors = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
     let Ok(tensor) = tensors.tensor(name) else { return Ok(None) };

@@ -1,4 +1,4 @@
-//! Bootstrap confidence intervals of statistics.
+//! Bootstrap confidence intervals of a statistic, such as a mean.
 
 use rand::RngExt;
 
@@ -8,14 +8,14 @@ use super::stream;
 /// Number of bootstrap resamples.
 const RESAMPLES: usize = 2000;
 
-/// The 95 % percentile interval of `statistic` over `samples`, which are resampled with replacement (Efron 1979; section VI
-/// of \[GSFM26\]). The random numbers come from `seed`. NaN if there are no samples.
+/// The 95 % percentile interval of `statistic` over `samples`, which are resampled with replacement (Efron 1979; section VI of
+/// the paper \[GSFM26\], see `src/lib.rs`). `seed` is the seed of the random numbers. NaN if there are no samples.
 pub fn interval(samples: &[f64], seed: u64, statistic: impl Fn(&[f64]) -> f64) -> [f64; 2] {
     stratified_interval(std::slice::from_ref(&samples), seed, statistic)
 }
 
-/// The same interval for samples in `strata`. Each stratum is resampled separately and keeps its size (rliable, Agarwal et al.
-/// 2021). `statistic` gets the resampled strata as one list, in order.
+/// The same interval for samples in `strata`. Each stratum is resampled separately and keeps its size (Agarwal et al. 2021,
+/// program rliable). `statistic` gets the resampled samples of all strata as one list, stratum after stratum.
 pub fn stratified_interval<S: AsRef<[f64]>>(
     strata: &[S],
     seed: u64,
@@ -46,7 +46,7 @@ mod tests {
     use crate::statistics::mean;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// The coverage of the interval of a mean is close to its nominal value.
+    /// The interval of a mean covers the true mean nearly as often as it should.
     #[test]
     fn intervals_cover_the_mean() {
         let mut random = stream::stream(5, &[]);
@@ -58,8 +58,8 @@ mod tests {
                 low <= 0.0 && 0.0 <= high
             })
             .count();
-        // The nominal coverage is 95 %. With 50 samples the bootstrap covers 1–2 % less. The binomial standard deviation of
-        // the counted coverage is 1.5 %.
+        // The nominal coverage is 95 %. With 50 samples the bootstrap covers 1–2 % less. The binomial standard deviation of the
+        // coverage counted over 200 intervals is 1.5 %.
         assert!((178..=199).contains(&covered), "{covered} of 200");
         let all = interval(&[2.0; 7], 1, mean);
         assert_eq!(all, [2.0, 2.0]);

@@ -5,12 +5,12 @@ use rand::RngExt;
 
 use super::Real;
 
-/// Largest number of units that a layer may have. [`Units`] has heap buffers for this number, which are allocated once.
-/// [`Dense::evaluate_in`] and [`Dense::evaluate_one`] therefore accept any network and allocate no memory.
+/// Largest number of units that a layer may have. The buffers of [`Units`] have room for this number. With them,
+/// [`Dense::evaluate_in`] and [`Dense::evaluate_one`] accept any network and allocate no memory.
 pub const WIDEST: usize = 512;
 
 /// Largest number of units in a layer for [`Dense::evaluate`] and [`Dense::last_hidden`], which use the stack. They need no
-/// [`Units`] and allocate no memory, but panic for a wider network. A residual with a wider layer is refused.
+/// [`Units`] and allocate no memory, but panic for a wider network. A model with a wider residual network is refused.
 pub const ON_STACK: usize = 128;
 
 /// A dense network: affine layers with max(0, ·) between them, and none after the last layer.
@@ -46,7 +46,8 @@ impl<R: Copy> Units<R> {
     }
 }
 
-/// Iterator over a network's layers. The named type allows `#[inline(always)]`, which kernels need.
+/// Iterator over a network's layers. It is a named type so that its `next` can be `#[inline(always)]`: a call that is not
+/// inlined would not use the caller's vector instructions.
 #[derive(Clone, Debug)]
 pub struct Layers<'a> {
     sizes: &'a [usize],

@@ -6,8 +6,8 @@ use super::{Real, each};
 
 /// A value with its gradient with respect to `N` inputs.
 ///
-/// The scalar type `T` is generic because SIMD lanes ([`Lanes`](super::Lanes)) can have gradients too. The crate `num-dual`
-/// is not used, because its scalar must be a float with comparisons.
+/// The scalar type `T` is generic, so that SIMD vectors ([`Lanes`](super::Lanes)) can have gradients too. The crate `num-dual`
+/// is not used, because it needs scalars that can be compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dual<const N: usize, T = f64> {
     /// Value of the function.
@@ -17,14 +17,15 @@ pub struct Dual<const N: usize, T = f64> {
 }
 
 impl<const N: usize, T: Real> Dual<N, T> {
-    /// The input with number `index` (from 0). Its derivative with respect to itself is one.
+    /// The input with number `index` (from 0) and the value `value`. Its derivative with respect to itself is one.
     pub fn variable(value: T, index: usize) -> Self {
         let mut gradient = [T::zero(); N];
         gradient[index] = T::from_f64(1.0);
         Dual { value, gradient }
     }
 
-    /// A function's value with its gradient by the chain rule. `slope` is the function's derivative at `self`.
+    /// The result of applying a function to `self`, with the gradient by the chain rule. `value` and `slope` are the function's
+    /// value and derivative at `self`.
     #[inline(always)]
     fn chain(self, value: T, slope: T) -> Self {
         Dual { value, gradient: each(self.gradient, |g| g * slope) }
@@ -135,7 +136,7 @@ impl<const N: usize, T: Real> Real for Dual<N, T> {
         }
         Dual { value: T::where_less(a.value, b.value, then.value, otherwise.value), gradient }
     }
-    // the gradient of a constant is zero, which saves half of the products
+    // the factor has no gradient, which saves half of the products of a multiplication
     #[inline(always)]
     fn scale(self, factor: f64) -> Self {
         Dual { value: self.value.scale(factor), gradient: each(self.gradient, |g| g.scale(factor)) }

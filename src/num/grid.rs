@@ -3,12 +3,12 @@
 use super::Real;
 use super::table::TableError;
 
-/// Largest number of points along the second variable. The ramps between all these points are held in registers or on the stack.
+/// Largest number of points along the second variable. [`Grid::at`] holds one number for each in registers or on the stack.
 const MOST_COLUMNS: usize = 16;
 /// Largest number of points along the first variable.
 const MOST_ROWS: usize = 100;
 
-/// A bilinear function of two variables.
+/// A bilinear function of the variables x and y.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     x: Vec<f64>,
@@ -103,8 +103,8 @@ impl Grid {
         [&self.x, &self.y]
     }
 
-    /// Value at (`x`, `y`). NaN if `x` or `y` is NaN. It is a sum of clipped ramps as in [`Table::at`](super::Table::at), which
-    /// needs no search and hence no branch per lane.
+    /// Value at (`x`, `y`). NaN if `x` or `y` is NaN. The value is a sum of clipped ramps as in [`Table::at`](super::Table::at).
+    /// The sum needs no search for an interval, and hence no branch for each lane of a SIMD vector.
     #[inline(always)]
     pub fn at<R: Real>(&self, x: R, y: R) -> R {
         let mut ramps = [R::zero(); MOST_COLUMNS];

@@ -1,4 +1,4 @@
-//! Vector lanes: single-precision numbers that are evaluated together.
+//! SIMD lanes: single-precision numbers that one instruction evaluates together.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -9,9 +9,9 @@ use super::register::{ROUND, Register};
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::{__m128, __m256, __m512};
 
-/// `N` lanes in a register `V`, one for each candidate of a batch.
+/// `N` lanes in registers of the type `V`. Each lane belongs to one member of a batch, such as an aircraft.
 ///
-/// With an array (`V = [f32; N]`) the compiler vectorises the operations. The result is slow for AVX-512. With the registers of
+/// With an array (`V = [f32; N]`) the compiler vectorises the operations, but its AVX-512 code is slow. With the registers of
 /// an instruction set, each operation is an intrinsic.
 ///
 /// With `FUSED`, [`Real::mul_add`] rounds only once, which changes the last bits of results. `FUSED` doubles the speed if
@@ -27,14 +27,14 @@ pub type Avx512<const FUSED: bool> = Lanes<16, FUSED, __m512>;
 /// Sixteen lanes in AVX2 registers.
 #[cfg(target_arch = "x86_64")]
 pub type Avx2<const FUSED: bool> = Lanes<16, FUSED, Pair<__m256>>;
-/// Sixteen lanes in registers of the target's baseline, which every x86-64 processor has.
+/// Sixteen lanes in SSE2 registers, which every x86-64 processor has.
 #[cfg(target_arch = "x86_64")]
 pub type Base<const FUSED: bool> = Lanes<16, FUSED, Pair<Pair<__m128>>>;
-/// Sixteen lanes in registers of the target's baseline.
+/// Sixteen lanes as an array.
 #[cfg(not(target_arch = "x86_64"))]
 pub type Base<const FUSED: bool> = Lanes<16, FUSED>;
 
-/// Whether the target's baseline has a fused multiply-add.
+/// Whether every processor of the target architecture has a fused multiply-add.
 pub const BASE_FUSED: bool = cfg!(target_arch = "aarch64");
 
 impl<const N: usize, const FUSED: bool> Lanes<N, FUSED> {

@@ -1,5 +1,5 @@
-//! Numerics: the generic scalar of the equations with its implementations, networks, tables, statistics and seeded random
-//! streams.
+//! Numerics: the trait [`Real`] of the number types for which the model equations are generic (f64, SIMD vectors, dual numbers),
+//! and neural networks, tables, statistics and random numbers from a seed.
 
 pub mod bootstrap;
 pub mod dense;

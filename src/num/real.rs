@@ -44,12 +44,12 @@ pub trait Real:
     fn abs(self) -> Self {
         Self::where_less(self, Self::zero(), -self, self)
     }
-    /// The smaller of two numbers. NaN if `self` is NaN, because a limit must not hide a NaN.
+    /// The smaller of two numbers. If `self` is NaN, the result is NaN, because a limit must not hide a NaN.
     #[inline(always)]
     fn min(self, other: Self) -> Self {
         Self::where_less(other, self, other, self)
     }
-    /// The larger of two numbers. NaN if `self` is NaN.
+    /// The larger of two numbers. If `self` is NaN, the result is NaN.
     #[inline(always)]
     fn max(self, other: Self) -> Self {
         Self::where_less(self, other, other, self)

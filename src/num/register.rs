@@ -1,20 +1,20 @@
-//! Processor registers that hold lanes, and the operations on them.
+//! SIMD registers of the processor and the operations on them. A register has several lanes, each with one number.
 
 use std::fmt::Debug;
 
-/// The constant 1.5 · 2²³. Adding it to a number and then subtracting it rounds the number to the nearest integer without a
-/// call. The last bits of the sum are those of the integer.
+/// The constant 1.5 · 2²³. Adding it to a number and then subtracting it rounds the number to the nearest integer, without a
+/// function call. The last bits of the sum are those of the integer.
 pub(super) const ROUND: f32 = 12_582_912.0;
 
-/// Single-precision numbers that one instruction processes together. Each operation rounds once as in IEEE 754. All kinds
-/// of registers therefore give bit-identical results.
+/// Single-precision numbers that one instruction processes together. Each operation rounds once as in IEEE 754, so that all
+/// kinds of registers give bit-identical results.
 ///
 /// The registers of an instruction set may be used only in functions that are compiled for this set.
 pub trait Register: Copy + Debug + Send + Sync + 'static {
-    /// Number of lanes.
+    /// Number of lanes of the register.
     const LANES: usize;
-    /// Number of sums that are computed at the same time. It is large enough to hide the latency of a multiply-add and small
-    /// enough to leave registers for the operands.
+    /// Number of sums that a matrix product computes at the same time. It is large enough to hide the latency of a multiply-add
+    /// and small enough to leave registers for the operands.
     const SUMS: usize;
     /// The same number in every lane.
     fn splat(x: f32) -> Self;
@@ -42,19 +42,19 @@ pub trait Register: Copy + Debug + Send + Sync + 'static {
     fn lesser(self, other: Self) -> Self;
     /// The larger number in each lane: `self > other ? self : other`.
     fn greater(self, other: Self) -> Self;
-    /// Selection in each lane: `a < b ? then : otherwise`.
+    /// In each lane: `a < b ? then : otherwise`.
     fn where_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self;
-    /// Sine and cosine of an angle plus n quarter turns. `sine` and `cosine` are those of the angle. `shifted` is n + 1.5 · 2²³,
+    /// Sine and cosine of an angle plus n quarter turns, from the `sine` and `cosine` of the angle. `shifted` is n + 1.5 · 2²³,
     /// whose last bits are those of n.
     fn quarters(shifted: Self, sine: Self, cosine: Self) -> (Self, Self);
     /// The power 2ⁿ of an integer n in −126..=127.
     fn power(n: Self) -> Self;
-    /// Sum over the lanes. The upper half is repeatedly added to the lower half.
+    /// Sum over the lanes. The upper half of the lanes is added to the lower half until one lane is left.
     fn sum(self) -> f32;
 }
 
-/// The values of an expression for `i` from 0 to `N` − 1. The macro is a loop because `std::array::from_fn` might not be inlined
-/// and would then be compiled without its caller's vector instructions.
+/// An array with the value of an expression for each index from 0 to `N` − 1. It is a loop because `std::array::from_fn` might
+/// not be inlined, and would then be compiled without the caller's vector instructions.
 macro_rules! entries {
     ($i:ident => $value:expr) => {{
         let mut all = [0.0; N];
@@ -164,7 +164,7 @@ impl<const N: usize> Register for [f32; N] {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pair<V>(V, V);
 
-/// Implements each operation separately for the two halves.
+/// Implements operations of [`Pair`] by the same operation on each of its two registers.
 macro_rules! halves {
     ($($method:ident($($other:ident),*)),*) => {$(
         #[inline(always)]
@@ -224,7 +224,7 @@ impl<V: Register> Register for Pair<V> {
     }
 }
 
-/// Implements [`Register`] with intrinsics that differ only in their prefix.
+/// Implements the operations of [`Register`] for which the intrinsics of all instruction sets differ only in their names.
 #[cfg(target_arch = "x86_64")]
 macro_rules! intrinsics {
     ($register:ty, $lanes:literal, $sums:literal, $add:ident $sub:ident $mul:ident $div:ident $min:ident $max:ident

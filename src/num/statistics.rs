@@ -29,8 +29,8 @@ pub fn interquartile_mean(samples: &[f64]) -> f64 {
 }
 
 /// Integral correlation length, in samples, of a series with gaps between its `parts`. The length is the sum of the
-/// autocorrelation over positive and negative lags, up to the lag at which the autocorrelation first falls to 0.05. White
-/// noise has the length 1. The series must have zero mean, because its mean is not removed.
+/// autocorrelation over all positive and negative lags below the lag at which it first falls to 0.05. White noise has the
+/// length 1. The series must have zero mean, because its mean is not removed.
 pub fn correlation_length(parts: &[Vec<f64>]) -> f64 {
     let mean_product = |lag: usize| {
         let pairs = parts.iter().flat_map(|part| part.iter().zip(part.iter().skip(lag)));

@@ -1,4 +1,4 @@
-//! A function of one variable given by points, linear between them and constant beyond them.
+//! A function of one variable that is given by points. It is linear between the points and constant beyond them.
 
 use super::Real;
 
@@ -6,7 +6,7 @@ use super::Real;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     floor: f64,
-    /// Segments between neighbouring points, each with its start in x, its length in x and its slope.
+    /// For each segment between neighbouring points: start in x, length in x, and slope.
     segments: Vec<(f64, f64, f64)>,
 }
 
@@ -42,7 +42,7 @@ pub enum TableError {
 const MAX_POINTS: usize = 1000;
 
 impl Table {
-    /// The table with the points (`x[i]`, `y[i]`), where `x` increases.
+    /// Makes the table with the points (`x[i]`, `y[i]`). `x` must increase.
     pub fn new(x: &[f64], y: &[f64]) -> Result<Table, TableError> {
         if x.len() != y.len() {
             return Err(TableError::Uneven(x.len(), y.len()));
@@ -84,8 +84,8 @@ impl Table {
         points
     }
 
-    /// Value at `x`. NaN if `x` is NaN. It is a sum of clipped ramps, which needs no search and hence no branch per lane. At a
-    /// point of the table the derivative is the slope of the segment to the right.
+    /// Value at `x`; NaN if `x` is NaN. It is computed as a sum of clipped ramps, without a search, so that SIMD lanes need no
+    /// branches. At a point of the table, the derivative is the slope of the segment to the right of it.
     #[inline(always)]
     pub fn at<R: Real>(&self, x: R) -> R {
         // the second term is zero, or NaN if `x` is NaN

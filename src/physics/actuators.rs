@@ -1,12 +1,13 @@
-//! Actuators: discrete filters that turn commands into the deflections that act on the airframe.
+//! Actuators: discrete-time filters that convert commands to deflections and throttle position.
 //!
-//! The time step is 0.01 s. JSBSim discretises each filter with the bilinear (Tustin) rule at its simulation step. The
-//! recurrences here have the same coefficients and reproduce JSBSim's filters up to rounding.
+//! The time step is 0.01 s. As in JSBSim, the filters are discretised with the bilinear (Tustin) rule. They reproduce JSBSim's
+//! filters at this step up to rounding.
 
 use crate::servos::{ActuatorFigures, Surface};
 use greylag_num::{Real, each};
 
-/// A command to the actuators: the action of eq. (29) of \[GSFM26\], with throttle = (a_thr + 1)/2.
+/// A command to the actuators. It is the action of eq. (29) of the paper \[GSFM26\] (see `src/lib.rs`), except that the throttle
+/// has the range 0..1 and not −1..1.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Command<R = f64> {
     /// Aileron, −1..1; positive rolls right.
@@ -28,7 +29,7 @@ impl Command {
         [self.aileron, self.elevator, self.throttle, self.rudder].iter().all(|x| x.is_finite())
     }
 
-    /// The command limited to its ranges.
+    /// The command with each component limited to its range.
     pub fn clamped(self) -> Self {
         Command {
             aileron: self.aileron.clamp(-1.0, 1.0),
@@ -39,7 +40,7 @@ impl Command {
     }
 }
 
-/// Largest number of `lag(…)` and `delay(…)` terms, counted together, in all effect files of one model.
+/// Largest number of `lag(…)` and `delay(…)` terms, counted together, in the formulas of all effect files of one model.
 pub const LAGS: usize = 2;
 
 /// Deflections and throttle position that act on the airframe at one instant.
@@ -53,13 +54,13 @@ pub struct Controls<R = f64> {
     pub throttle: R,
     /// Rudder deflection δr, rad; positive trailing edge left. Zero on an aircraft without a rudder.
     pub rudder: R,
-    /// Values of the model's `lag(…)` and `delay(…)` terms at this instant. `None` if the past controls are unknown: each
-    /// term then takes its steady-state value, the present value of its argument.
+    /// Values of the model's `lag(…)` and `delay(…)` terms at this instant. `None` if the past controls are unknown. Each term
+    /// then has its steady-state value, the present value of its argument.
     pub lagged: Option<[R; LAGS]>,
 }
 
 impl<R: Copy> Controls<R> {
-    /// Converts every number of the controls to another scalar.
+    /// Applies `f` to every number of the controls, for example to convert it to another number type.
     #[inline(always)]
     #[expect(
         clippy::manual_map,
@@ -96,7 +97,7 @@ impl Controls {
     }
 }
 
-/// The observed actuator state z, eq. (27) of \[GSFM26\].
+/// The observed actuator state z, eq. (27) of the paper, with a rudder in addition.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct ActuatorState<R = f64> {
     /// Aileron position, rad; positive rolls right.
@@ -116,7 +117,7 @@ pub struct ActuatorState<R = f64> {
 }
 
 impl<R: Copy> ActuatorState<R> {
-    /// The positions as `Controls`, whose `lagged` is `None`.
+    /// The positions as [`Controls`], with `lagged` = `None`.
     #[inline(always)]
     pub fn controls(&self) -> Controls<R> {
         Controls {
@@ -129,7 +130,7 @@ impl<R: Copy> ActuatorState<R> {
     }
 }
 
-/// The second-order filter of a surface, with its memory. The travel and rate limits apply to the filter's output.
+/// The memory of a surface's second-order filter. The travel and rate limits apply to the filter's output.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceFilter<R = f64> {
     /// The last two commanded deflections, rad, newest first.
@@ -142,7 +143,8 @@ pub struct SurfaceFilter<R = f64> {
 
 /// The filters of all actuators. An aircraft without a rudder has no rudder filter.
 ///
-/// They are the complete (Markov) state of the actuators. The observation [`ActuatorState`] is not complete.
+/// The filters hold the complete state of the actuators: with the future commands it determines the future deflections. The
+/// observation [`ActuatorState`] alone does not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Actuators<R = f64> {
     aileron: SurfaceFilter<R>,
@@ -157,8 +159,8 @@ impl<R: Real> SurfaceFilter<R> {
         SurfaceFilter { input: [position; 2], output: [position; 2], clipped: [position; 2] }
     }
 
-    /// The filter memory that gives the observed `position` (rad) and `rate` (rad/s) after the last two commands, `old` and
-    /// then `new`.
+    /// The filter memory that agrees with an observed `position` (rad) and `rate` (rad/s) and with the last two commands, first
+    /// `old`, then `new`. `step` is the time step, s.
     #[inline(always)]
     fn observed(
         [position, rate]: [R; 2],
@@ -211,8 +213,8 @@ impl<R: Real> SurfaceFilter<R> {
 }
 
 impl<R: Real> Actuators<R> {
-    /// Actuators at rest at `controls`, under commands that hold them there. The rudder keeps its position in
-    /// `step` if the figures describe no rudder.
+    /// Actuators at rest at `controls`, as under constant commands that hold them there. The result has a rudder filter. If the
+    /// figures describe no rudder, [`step`](Self::step) leaves the rudder where it is.
     pub fn at_rest(controls: &Controls<R>) -> Self {
         Actuators {
             aileron: SurfaceFilter::at(controls.aileron),
@@ -223,15 +225,15 @@ impl<R: Real> Actuators<R> {
         }
     }
 
-    /// Removes the rudder's filter if `figures` describe no rudder.
+    /// These actuators without the rudder's filter if `figures` describe no rudder.
     pub fn fitted(self, figures: &ActuatorFigures) -> Self {
         Actuators { rudder: figures.rudder.and(self.rudder), ..self }
     }
 
-    /// The filter memories consistent with an observed `state` after the commands `previous` (newest first).
+    /// The filter memories that agree with an observed `state` and the last two commands `previous` (newest first).
     ///
-    /// The memories are exact unless a surface is at a travel limit or moves at its rate limit. At a limit the output of the
-    /// filter is not observed, and the first step after the limit may be wrong by up to 8 % of the travel.
+    /// The memories are exact unless a surface is at a travel limit or moves at its rate limit. At a limit the unlimited output
+    /// of the filter is not observed. The deflection one step after the limit may then be wrong by up to 8 % of the travel.
     #[inline(always)]
     pub fn from_observed(
         state: &ActuatorState<R>,
@@ -266,7 +268,7 @@ impl<R: Real> Actuators<R> {
         }
     }
 
-    /// Selects the filters of `then` in the SIMD lanes in which `chosen` is above zero, and those of `self` in the others.
+    /// The filters of `then` in the SIMD lanes in which `chosen` is above zero, and those of `self` in the other lanes.
     #[inline(always)]
     pub fn replaced(&self, chosen: R, then: &Self) -> Self {
         let one = |old: R, new: R| R::where_less(R::zero(), chosen, new, old);
@@ -295,7 +297,7 @@ impl<R: Real> Actuators<R> {
         self.throttle_input = command.throttle;
     }
 
-    /// Present deflections and throttle position. `lagged` is `None`.
+    /// The present deflections and throttle position, with `lagged` = `None`.
     #[inline(always)]
     pub fn controls(&self) -> Controls<R> {
         Controls {
@@ -310,7 +312,7 @@ impl<R: Real> Actuators<R> {
         }
     }
 
-    /// The present actuator state. Its rates are differences over the last step.
+    /// The present actuator state. Its rates are the changes of the deflections over the last step, divided by the step.
     #[inline(always)]
     pub fn observed(&self, figures: &ActuatorFigures) -> ActuatorState<R> {
         let (rudder, rudder_rate) = match &self.rudder {
@@ -341,7 +343,7 @@ mod tests {
     #[test]
     fn recurrences_are_those_measured_in_the_simulator() {
         let f = figures();
-        // the simulator's surface coefficients are known to five decimals
+        // the coefficients that JSBSim prints for surfaces have five decimals
         for (ours, printed) in [
             (f.aileron.filter[0], 0.12774),
             (-f.aileron.filter[1], 0.76644),
@@ -373,7 +375,7 @@ mod tests {
             actuators.step(&Command::IDLE, &f);
             rebuilt.step(&Command::IDLE, &f);
             let (a, b) = (actuators.controls(), rebuilt.controls());
-            // equal up to rounding of the difference quotient
+            // equal up to the rounding of the rate, which is a difference quotient
             assert!(
                 (a.aileron - b.aileron).abs() < 1e-14 && (a.elevator - b.elevator).abs() < 1e-14
             );

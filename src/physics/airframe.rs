@@ -28,7 +28,7 @@ pub struct Geometry {
     pub chord: f64,
 }
 
-/// Flight envelope: the limits that the companion enforces.
+/// Flight envelope: the limits that this program enforces in flight.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Envelope {
@@ -87,7 +87,7 @@ impl Envelope {
 /// Reference flight condition of an aircraft.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reference {
-    /// Reference airspeed V0 of x_c, eq. (21) of \[GSFM26\], m/s.
+    /// Reference airspeed V0 of the state's characteristic scale x_c, eq. (21) of \[GSFM26\], m/s.
     pub airspeed: f64,
     /// Altitude at which controllers are designed and models are trimmed and simulated, m above mean sea level.
     pub altitude: f64,
@@ -408,7 +408,7 @@ pub fn named(name: String) -> Result<String, String> {
     if fits { Ok(name) } else { Err("name must be one line of 1 to 64 bytes; give it one".into()) }
 }
 
-/// Checks that the schema of a file is one of 1 to `newest`.
+/// Checks that the schema of a file lies in 1 to `newest`.
 pub fn check_schema(schema: u32, newest: u32) -> Result<(), String> {
     if (1..=newest).contains(&schema) {
         return Ok(());
@@ -419,8 +419,7 @@ pub fn check_schema(schema: u32, newest: u32) -> Result<(), String> {
     ))
 }
 
-/// Returns the value of `number` if it is positive and at most `most`, the largest value of any aircraft. The error names
-/// `field`.
+/// Returns the value of `number` if it is positive and at most `most`. The error names `field`.
 pub fn positive(field: &str, number: &Sourced, most: f64) -> Result<f64, String> {
     within(field, number, [most * 1e-9, most])
 }

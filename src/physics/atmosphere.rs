@@ -1,11 +1,11 @@
-//! Air density, either constant or of the standard atmosphere, and constant gravity.
+//! Air density (constant, or that of the standard atmosphere) and constant gravity.
 
 /// Sea-level density of the standard atmosphere (ISO 2533), the reference of equivalent airspeed, kg/m³.
 pub const SEA_LEVEL_DENSITY: f64 = 1.225;
 /// Standard gravity (ISO 80000-3), the unit g of load factors, m/s².
 pub const STANDARD_GRAVITY: f64 = 9.806_65;
-/// Effective gravity at middle latitudes, m/s², for use without a model of the aircraft. It is JSBSim's value at 46.8°
-/// latitude and 600 m. Near sea level, gravity at any latitude is within 0.03 m/s² of this value.
+/// Effective gravity at middle latitudes, m/s². It is used where no model of the aircraft states the gravity. The value is that
+/// of JSBSim at 46.8° latitude and 600 m. Near sea level, gravity at any latitude is within 0.03 m/s² of it.
 pub const MIDDLE_GRAVITY: f64 = 9.806;
 
 /// Law of the air density over altitude.

@@ -1,4 +1,7 @@
-//! The complete catalogue of effects: effects on forces, moments and the body, and input effects.
+//! The complete catalogue of effects.
+//!
+//! An effect adds terms to forces, moments or the body (mass and inertia). An input effect changes the deflections between the
+//! measured actuator position and the surface.
 
 use super::effects::{self, Description};
 use super::{formula, inputs};

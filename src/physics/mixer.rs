@@ -1,10 +1,11 @@
-//! The mixer: it maps the four virtual controls to named surfaces and motors, and their positions back to the controls.
+//! The mixer maps the four controls of a model to the surfaces and motors of an aircraft, and their positions back to the
+//! controls.
 //!
-//! Model, planner and logs have four controls: aileron, elevator, rudder, throttle. An aircraft may have other surfaces: two
-//! elevons, a V-tail, several motors. Effector i receives the command u_i = Σ_j g_ij c_j, where c_j are the commands of the
-//! controls. A surface moves to the deflection that belongs to u_i, which is limited to −1..1. The inverse mapping is
-//! c = g⁺ u by least squares, where u_i is the deflection divided by half the travel. This mapping is linear, so forces that
-//! are linear in the surfaces' deflections are also linear in the deflections of the controls.
+//! Model, planner and logs have four controls: aileron, elevator, rudder, throttle. An aircraft may have other effectors
+//! (surfaces and motors): two elevons, a V-tail, several motors. Effector i receives the command u_i = Σ_j g_ij c_j, where c_j
+//! are the commands of the controls. A surface moves to the deflection that belongs to u_i, which is limited to −1..1. The
+//! inverse mapping is c = g⁺ u by least squares, where u_i is now the deflection divided by half the travel. This mapping is
+//! linear. Forces that are linear in the deflections of the surfaces are therefore also linear in those of the controls.
 
 use crate::Command;
 use crate::servos::{Travel, Travels};
@@ -14,7 +15,7 @@ pub const CONTROLS: [&str; 4] = ["aileron", "elevator", "rudder", "throttle"];
 /// Relative tolerance for linear dependence. A control's column of gains is dependent if its part orthogonal to the preceding
 /// columns is shorter than this fraction of its length.
 const DEPENDENT: f64 = 1e-6;
-/// Relative tolerance between a control's travel in the file and the travel that its surfaces give.
+/// Largest relative difference between the travel of a control that a file states and the travel that its surfaces give.
 const TRAVEL: f64 = 1e-3;
 
 /// Kind of an effector.
@@ -22,7 +23,7 @@ const TRAVEL: f64 = 1e-3;
 pub enum Does {
     /// A surface, with its travel: the deflections at the commands −1 and 1, rad.
     Deflects(Travel),
-    /// A motor, tractor or pusher, with a command of 0..1.
+    /// A tractor or pusher motor, with a command of 0..1.
     Pulls,
 }
 
@@ -128,7 +129,7 @@ pub struct Mixer {
     effectors: Vec<Effector>,
     /// Pseudo-inverse g⁺: command of each control per command of each effector, one row per effector.
     back: Vec<[f64; 4]>,
-    /// Deflection of each control at the command 1, rad: the mean over its surfaces. It is 1 for the throttle.
+    /// Deflection of each control at the command 1, rad: the mean over the surfaces that it moves. It is 1 for the throttle.
     unit: [f64; 4],
 }
 
@@ -154,7 +155,7 @@ impl Mixer {
         Ok(Mixer { effectors, back, unit })
     }
 
-    /// The surfaces and motors.
+    /// All surfaces and motors of the aircraft.
     pub fn effectors(&self) -> &[Effector] {
         &self.effectors
     }
@@ -166,7 +167,8 @@ impl Mixer {
         self.effectors.iter().map(|e| e.limited(sum(e))).collect()
     }
 
-    /// Deflections of the controls (rad; 0..1 for the throttle) at the effectors' `positions`, by [`Self::shares`].
+    /// Deflections of the controls (rad; 0..1 for the throttle) at the effectors' `positions`. They are sums of the positions
+    /// times [`Self::shares`].
     pub fn deflections(&self, positions: &[f64]) -> [f64; 4] {
         let mut out = [0.0; 4];
         for (shares, position) in self.shares().zip(positions) {
@@ -175,23 +177,23 @@ impl Mixer {
         out
     }
 
-    /// Contribution of each effector's position (rad; 0..1 for a motor) to the deflection of each control (rad; 0..1 for
-    /// the throttle).
+    /// For each effector: contribution of its position (rad; 0..1 for a motor) to the deflection of each control (rad; 0..1 for
+    /// the throttle), per unit.
     pub fn shares(&self) -> impl Iterator<Item = [f64; 4]> {
         let both = self.back.iter().zip(&self.effectors);
         both.map(|(row, e)| std::array::from_fn(|j| row[j] * self.unit[j] / e.unit()))
     }
 
-    /// Contribution of each effector's command to the command of each control.
+    /// For each effector: contribution of its command to the command of each control, per unit.
     pub fn command_shares(&self) -> &[[f64; 4]] {
         &self.back
     }
 
-    /// Travels of the controls (rad): the deflections at full command of each control alone.
+    /// Travels of the controls (rad): deflections of each control when it alone is at −1 or 1.
     pub fn travels(&self) -> Travels {
         let travel = |j: usize| {
             let at = |value: f64| {
-                // at half throttle, differential thrust can yaw the aircraft to both sides
+                // the throttle is at one half, where differential thrust can yaw the aircraft to both sides
                 let given = |e: &Effector| e.limited(e.gains[j] * value + 0.5 * e.gains[3]);
                 let positions: Vec<f64> =
                     self.effectors.iter().map(|e| e.position(given(e))).collect();
@@ -212,7 +214,7 @@ impl Mixer {
         let pairs = [
             (Some(own.aileron), Some(travels.aileron)),
             (Some(own.elevator), Some(travels.elevator)),
-            // if only motors act as the rudder, its travel is not an angle
+            // if only motors yaw the aircraft, the travel of the rudder is not an angle
             (own.rudder.filter(|_| self.rudder_deflects()), travels.rudder),
         ];
         for (control, (own, given)) in CONTROLS.into_iter().zip(pairs) {
@@ -236,8 +238,8 @@ impl Mixer {
     }
 }
 
-/// Deflection of control `j` at the command 1: the mean over the surfaces that it moves (rad). If it moves only motors, the
-/// mean over these motors (0..1).
+/// Deflection of control `j` at the command 1: the mean over the surfaces that it moves (rad). If it moves only motors, it is
+/// the mean over these motors (0..1).
 fn unit(effectors: &[Effector], j: usize) -> f64 {
     if j == 3 {
         return 1.0;

@@ -1,11 +1,12 @@
-//! The point at which forces and moments are evaluated: state, controls and airflow.
+//! The point (state, controls and airflow) at which the effects of a model are evaluated. An effect is one physical contribution
+//! to the forces and moments.
 
 use crate::airframe::Geometry;
 use crate::rigid_body::{ForceAxes, Vector};
 use crate::{Controls, State, Wrench};
 use greylag_num::Real;
 
-/// Airflow quantities, which are computed once for all effects.
+/// Quantities of the airflow. They are computed once for all effects.
 #[derive(Clone, Copy, Debug)]
 pub struct AirData<R = f64> {
     /// Dynamic pressure times wing area, ½ρV²S, N.
@@ -60,13 +61,13 @@ pub struct Point<'a, R = f64> {
     pub state: &'a State<R>,
     /// Deflections and throttle position that act at this instant.
     pub controls: &'a Controls<R>,
-    /// Airflow at the state.
+    /// Airflow at `state`.
     pub air: &'a AirData<R>,
     /// Wing area, span and chord.
     pub geometry: &'a Geometry,
     /// Axes in which drag, side force and lift act.
     pub axes: ForceAxes,
-    /// Results of the first pass, for the effects that depend on them. Zero during the first pass.
+    /// Results of the first pass over the effects, for the effects that depend on them. Zero during the first pass.
     pub base: &'a Base<R>,
 }
 
@@ -74,13 +75,13 @@ pub struct Point<'a, R = f64> {
 /// and airflow.
 #[derive(Clone, Copy, Debug)]
 pub struct Base<R = f64> {
-    /// Sum of the forces and moments of these effects.
+    /// Sum of the forces and moments of the effects in the first pass.
     pub wrench: Wrench<R>,
-    /// Sum of the forces of these effects in body axes, N.
+    /// Sum of the forces of the effects in the first pass, in body axes, N.
     pub force: Vector<R>,
-    /// The part of `wrench` due to aileron, elevator and rudder.
+    /// The part of `wrench` that is due to aileron, elevator and rudder.
     pub deflected: Wrench<R>,
-    /// The value of `wrench` for neutral surfaces and zero body rates.
+    /// The value that `wrench` would have with neutral surfaces and zero body rates.
     pub still: Wrench<R>,
     /// Time derivative of the state under all effects of the model, in units of the state per second.
     pub rate: State<R>,

@@ -122,7 +122,7 @@ pub fn angular_acceleration<R: Real>(
     let RigidBody { jx, jy, jz, jxz, .. } = *body;
     let (p, q, r) = (state.p, state.q, state.r);
     let gamma = jx * jz - jxz * jxz;
-    // moments without the gyroscopic terms, then multiplied by the inverse of the inertia matrix
+    // the moments less the gyroscopic terms are multiplied by the inverse of the inertia matrix
     let roll = moment[0] + jxz * p * q - (jz - jy) * q * r;
     let pitch = moment[1] + (jz - jx) * p * r - jxz * (p * p - r * r);
     let yaw = moment[2] - jxz * q * r + (jx - jy) * p * q;
@@ -278,7 +278,7 @@ mod tests {
     };
     const GEOMETRY: Geometry = Geometry { area: 0.75, span: 2.1, chord: 0.3571 };
 
-    /// The reference evaluates eqs. (9), (11), (12) as printed in the paper, with the body velocities u, v, w.
+    /// The reference evaluates eqs. (9), (11), (12) as printed in \[GSFM26\], with the body velocities u, v, w.
     #[test]
     fn collected_rates_equal_the_printed_equations() {
         let air = AirData::new(&STATE, 1.156, 600.0, &GEOMETRY);

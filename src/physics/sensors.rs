@@ -1,13 +1,15 @@
-//! Prior information on an aircraft's sensors and on the wind, from the section `[sensors]` of a file.
+//! Prior information on an aircraft's sensors and on the wind, from the section `[sensors]` of an airframe file or a mapping
+//! file. It is used by the flight-path reconstruction, which estimates states, sensor errors and wind from kinematics alone. A
+//! skew is the delay with which a group of sensors is recorded.
 //!
 //! ```toml
 //! [sensors]
-//! wind = "still"                                # no wind: the three wind_… are fixed at 0
-//! clocks = "one"                                # all sensors sample at the same time: the skew_… are fixed at 0
+//! wind = "still"                                # no wind: the constants wind_… are fixed at 0
+//! clocks = "one"                                # no delays between the sensors: the constants skew_… are fixed at 0
 //! airspeed_scale = { value = 1.0, sd = 0.02 }   # ratio of measured to true airspeed; sd = 0 fixes it
 //! alpha_bias_rad = { value = 0.01, sd = 0.005 }
-//! vanes_sd_rad = 0.005                          # noise of the vanes
-//! vanes_at_m = [0.6, 0.0, -0.02]                # from the centre of gravity: forward, right, down
+//! vanes_sd_rad = 0.005                          # standard deviation of the vanes' noise
+//! vanes_at_m = [0.6, 0.0, -0.02]                # position relative to the centre of gravity: forward, right, down
 //! accelerometer_at_m = [0.05, 0.0, 0.01]
 //! ```
 
@@ -49,17 +51,17 @@ pub const CONSTANTS: [(&str, &str); 30] = [
     ("accelerometer_gain_z", ""),
 ];
 
-/// Keys of the sensors' noise, which is stated as standard deviations.
+/// Keys of the standard deviations of the sensors' noise, in the order of [`Noisy`].
 const NOISE: [&str; 4] = ["attitude_sd_rad", "airspeed_sd_mps", "vanes_sd_rad", "velocity_sd_mps"];
 
 /// Largest accepted distance of a sensor from the centre of gravity along each axis, m.
 const FARTHEST: f64 = 100.0;
 
-/// Prior of a constant of the sensors or the wind.
+/// Prior distribution of a constant of the sensors or the wind.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Known {
-    /// Mean, in the unit of [`CONSTANTS`]. An airspeed scale is measured airspeed divided by true airspeed.
+    /// Mean, in the unit given in [`CONSTANTS`]. `airspeed_scale` is the measured airspeed divided by the true airspeed.
     pub value: f64,
     /// Standard deviation, in the same unit. With 0 the constant is fixed.
     pub sd: f64,
@@ -80,7 +82,7 @@ pub struct Sensors {
 pub enum Noisy {
     /// Attitude: roll, pitch, yaw, rad.
     Attitude,
-    /// True airspeed, m/s.
+    /// Measured true airspeed, m/s.
     Airspeed,
     /// Angle of attack and sideslip, rad.
     Vanes,
@@ -116,7 +118,7 @@ impl TryFrom<BTreeMap<String, Written>> for Sensors {
 
     fn try_from(written: BTreeMap<String, Written>) -> Result<Self, String> {
         let mut sensors = Sensors::default();
-        // words such as "still" come first, so that the prior stated for a single constant replaces the one of a word
+        // words such as "still" are applied first, so that a prior stated for a single constant replaces that of a word
         for (name, value) in &written {
             if let Written::Word(word) = value {
                 sensors.take_word(name, word)?;
@@ -178,7 +180,7 @@ impl Sensors {
                     _ => return Err(format!("sensors.{name} takes no place; {}", known_keys())),
                 }
             }
-            // serde parses a list of two numbers as a value with its standard deviation
+            // serde takes a list of two numbers for a value and its standard deviation, so a short position arrives here
             Written::Known(_) if ["vanes_at_m", "accelerometer_at_m"].contains(&name) => {
                 return Err(format!("sensors.{name} is a place: [forward, right, down] in m"));
             }
@@ -204,7 +206,7 @@ impl Sensors {
         Ok(())
     }
 
-    /// These priors, replaced by the priors that `other` states.
+    /// A copy of `self` in which every entry that `other` has replaces the one of `self`.
     pub fn overridden_by(&self, other: &Sensors) -> Sensors {
         let mut all = self.clone();
         all.constants.extend(other.constants.iter().map(|(name, known)| (*name, *known)));
@@ -216,12 +218,12 @@ impl Sensors {
         all
     }
 
-    /// Prior of a constant of [`CONSTANTS`]. `None` if it is not stated.
+    /// Prior of the constant `name` of [`CONSTANTS`]. `None` if it is not stated.
     pub fn known(&self, name: &str) -> Option<Known> {
         self.constants.get(name).copied()
     }
 
-    /// Fixes a constant of [`CONSTANTS`] at `value` (in its unit), unless a prior is stated.
+    /// Fixes the constant `name` of [`CONSTANTS`] at `value` (in its unit), unless a prior is stated.
     pub fn hold(&mut self, name: &'static str, value: f64) {
         self.constants.entry(name).or_insert(Known { value, sd: 0.0 });
     }

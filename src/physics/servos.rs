@@ -1,4 +1,4 @@
-//! Servos: travel, rate limit and discrete filter of each actuator.
+//! Servos: travel, rate limit and discrete-time filter of each actuator.
 
 use crate::{Command, Controls};
 use greylag_num::Real;
@@ -39,12 +39,12 @@ impl Travel {
         self.least < deflection && deflection < self.most
     }
 
-    /// Deflection per unit of command on the side of `deflection`, rad.
+    /// Deflection per unit of command, rad, on the side of zero on which `deflection` lies.
     pub fn slope(&self, deflection: f64) -> f64 {
         if deflection < 0.0 { -self.least } else { self.most }
     }
 
-    /// Ratio of `deflection` (rad) to the travel on its side: the command for this deflection.
+    /// The command for `deflection` (rad), without limits: its ratio to the travel on its side of zero.
     pub fn part(&self, deflection: f64) -> f64 {
         deflection / self.slope(deflection)
     }
@@ -89,7 +89,7 @@ impl Travels {
     }
 }
 
-/// Actuator of a surface: its filter at one time step, its travel and its rate limit.
+/// Actuator of a surface: its discrete-time filter for a given time step, its travel and its rate limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
     /// Coefficients b0, a1, a2 of y = b0 (u + 2u₋₁ + u₋₂) − a1 y₋₁ − a2 y₋₂.
@@ -110,7 +110,7 @@ impl Surface {
     }
 }
 
-/// The actuators' discrete filters at one time step.
+/// The actuators of an aircraft, with discrete-time filters for a given time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActuatorFigures {
     /// Actuator of the ailerons.
@@ -141,7 +141,7 @@ impl ActuatorFigures {
         [k / (2.0 + k), (2.0 - k) / (2.0 + k)]
     }
 
-    /// Travels of the surfaces.
+    /// The travels of the surfaces.
     pub fn travels(&self) -> Travels {
         Travels {
             aileron: self.aileron.travel,
@@ -150,7 +150,7 @@ impl ActuatorFigures {
         }
     }
 
-    /// Command for the deflections and the throttle of `controls`, clamped to its ranges.
+    /// Command that gives the deflections and the throttle of `controls` in steady state, limited to the ranges of commands.
     pub fn command(&self, controls: &Controls) -> Command {
         Command {
             aileron: self.aileron.travel.part(controls.aileron),

@@ -1,4 +1,5 @@
-//! Size of an aircraft, relative to the size for which the catalogue's bounds of coefficients are stated.
+//! Size of an aircraft relative to a reference size. The catalogue of effects states bounds of coefficients for aircraft up to
+//! the reference size.
 
 use super::airframe::Geometry;
 use super::effects::Coefficient;
@@ -7,7 +8,7 @@ use super::rigid_body::RigidBody;
 /// Mass (kg) and span (m) up to which the catalogue's bounds apply unchanged.
 const WRITTEN_FOR: [f64; 2] = [25.0, 5.0];
 
-/// Name of the coefficient whose bounds grow with the lift coefficient of slow flight.
+/// Name of the coefficient whose bounds grow with the lift coefficient of slow flight, not with the size.
 const LIFT: &str = "CL0";
 /// Load factor of a gentle pull-up in slow flight. The bounds of `CL0` allow for it.
 const PULL: f64 = 1.5;
@@ -16,7 +17,7 @@ const SEA_LEVEL: f64 = 1.225;
 /// Standard gravity, m/s² (ISO 80000-3).
 const GRAVITY: f64 = 9.80665;
 
-/// Size of an aircraft relative to 25 kg and 5 m span: ratios of mass and span, each at least 1.
+/// Size of an aircraft relative to 25 kg and 5 m span: the ratios of mass and span, each at least 1, and the factor for `CL0`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
     mass: f64,

@@ -2,7 +2,7 @@
 
 use greylag_num::{Real, each};
 
-/// The physical state s^p = \[φ, θ, V_a, p, q, r, α, β\], eq. (4) of \[GSFM26\].
+/// The physical state s^p = \[φ, θ, V_a, p, q, r, α, β\], eq. (4) of \[GSFM26\] (T. Guerin et al., 2026).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct State<R = f64> {
     /// Roll angle φ, rad.
@@ -36,7 +36,7 @@ impl State {
         "beta_rad",
     ];
 
-    /// The initial state of an episode: wings level, α = β = 0, 16.67 m/s (section V-A of \[GSFM26\]).
+    /// The initial state of an episode (one flight): wings level, α = β = 0, 16.67 m/s (section V-A of \[GSFM26\]).
     pub const NEUTRAL: State = State {
         roll: 0.0,
         pitch: 0.0,
@@ -55,13 +55,13 @@ impl State {
 }
 
 impl<R: Copy> State<R> {
-    /// The components in the order of eq. (4).
+    /// The components in the order of eq. (4) of \[GSFM26\].
     #[inline(always)]
     pub fn to_array(&self) -> [R; 8] {
         [self.roll, self.pitch, self.airspeed, self.p, self.q, self.r, self.alpha, self.beta]
     }
 
-    /// A state from components in the order of eq. (4).
+    /// A state from components in the order of eq. (4) of \[GSFM26\].
     #[inline(always)]
     pub fn from_array([roll, pitch, airspeed, p, q, r, alpha, beta]: [R; 8]) -> Self {
         State { roll, pitch, airspeed, p, q, r, alpha, beta }

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Longest file that is read, bytes. It is a hundred times the longest shipped file. The limit bounds the memory of a
+/// Largest length of a file, bytes. It is a hundred times that of the longest shipped file. The limit bounds the memory of a
 /// parser, which is up to eighty times the length of the text.
 pub const LONGEST: u64 = 1 << 20;
 
@@ -15,7 +15,7 @@ pub const LONGEST: u64 = 1 << 20;
 pub fn read(path: &Path) -> io::Result<String> {
     let mut bytes = Vec::new();
     File::open(path)?.take(LONGEST + 1).read_to_end(&mut bytes)?;
-    // The length comes first: the limit may cut a character, which would read as text that is not UTF-8.
+    // The length is checked first: if the limit cuts a character, the rest is not valid UTF-8.
     if bytes.len() as u64 > LONGEST {
         let words = format!("it is longer than {} KiB, which no such file is", LONGEST >> 10);
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, words));
@@ -37,7 +37,7 @@ mod tests {
         assert!(refused.contains("longer than 1024 KiB"), "{refused}");
         std::fs::write(&path, " ".repeat(LONGEST as usize)).unwrap();
         assert_eq!(read(&path).unwrap().len() as u64, LONGEST);
-        // The limit lies within one of these characters of two bytes.
+        // The limit cuts one of these two-byte characters.
         std::fs::write(&path, "é".repeat(LONGEST as usize)).unwrap();
         let refused = read(&path).unwrap_err().to_string();
         assert!(refused.contains("longer than 1024 KiB"), "{refused}");

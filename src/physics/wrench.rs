@@ -5,8 +5,8 @@ use greylag_num::Real;
 /// A force or moment component in which an effect may act.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
-    /// Drag along the airflow, N, positive backwards, without thrust (see `BodyX`). In the weak form, `ChannelId::Drag` is
-    /// drag minus thrust.
+    /// Drag along the airflow, N, positive backwards, without thrust (see `BodyX`). The channel `ChannelId::Drag` of a
+    /// comparison is drag minus thrust.
     Drag,
     /// Lift across the airflow, N, positive upward.
     Lift,

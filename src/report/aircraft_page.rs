@@ -1,4 +1,4 @@
-//! Page on an aircraft from its model: three views, trim, modes, loops and control responses.
+//! The HTML page about an aircraft: three views, and trim, modes, LQI loops and control responses computed from its model.
 
 use std::fmt::Write;
 
@@ -11,14 +11,14 @@ use greylag_control::aircraft_check::AircraftCheck;
 use greylag_control::stick_response::{STEPPED, StickResponse};
 use greylag_model::GreyBox;
 
-/// Input of the page on an aircraft's model.
+/// Contents of the page about an aircraft.
 #[derive(Clone, Debug)]
 pub struct AircraftReport<'a> {
     /// The model of the aircraft.
     pub model: &'a GreyBox,
     /// Results of the checks of the model.
     pub check: &'a AircraftCheck,
-    /// Responses to a step of a quarter of full aileron and to a step of a quarter of full elevator.
+    /// Responses of the model to a step of a quarter of full aileron, and to one of a quarter of full elevator.
     pub responses: &'a [StickResponse; 2],
     /// Path of the model's file.
     pub model_file: String,
@@ -27,7 +27,7 @@ pub struct AircraftReport<'a> {
 }
 
 impl AircraftReport<'_> {
-    /// Builds the page.
+    /// Builds the page from these contents.
     pub fn page(&self) -> Page {
         let airframe = &self.model.airframe;
         let sections = vec![
@@ -122,7 +122,7 @@ impl AircraftReport<'_> {
             let [alpha, path] = [l.alpha, l.path].map(f64::to_degrees);
             let row = [l.airspeed, alpha, 100.0 * l.elevator, 100.0 * l.throttle];
             let row = row.map(|x| format!("{x:.1}").replace('-', "−"));
-            // a path within 0.05° of level counts as level
+            // a flight-path angle below 0.05° counts as level
             let path = if path.abs() < 0.05 {
                 "level".into()
             } else {
@@ -238,7 +238,7 @@ fn stick_note() -> String {
     )
 }
 
-/// Top, front and side view.
+/// Draws the top, front and side view of the aircraft.
 fn sketch(model: &GreyBox) -> Drawing {
     let g = &model.airframe.geometry;
     let (span, chord) = (g.span, g.chord);

@@ -1,4 +1,7 @@
-//! Page of a campaign: findings, tables with the paper's values, and the cell of each number.
+//! Page of a campaign: findings, tables with the paper's values, and the source of each number.
+//!
+//! A campaign is a planned set of runs over controllers, models and seeds. A cell is one of these runs. The paper is T. Guerin
+//! et al., 2026.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +15,7 @@ use greylag_campaign::statistics::{Estimate, aggregate};
 use greylag_campaign::tables::{self, Summary, SummaryRow};
 use greylag_campaign::{CampaignFile, Record};
 
-/// Names of the three statistics.
+/// Names of the three statistics of each table row.
 const STATISTICS: [&str; 3] = ["median", "interquartile mean", "mean"];
 
 /// Results of a finished or unfinished campaign.
@@ -26,14 +29,14 @@ pub struct CampaignReport<'a> {
     pub records: &'a [Record],
     /// Summary tables over the cells.
     pub summaries: &'a [Summary],
-    /// Verdict on each of the campaign's claims.
+    /// Verdict on each claim that the campaign file makes.
     pub findings: &'a [tables::Finding],
     /// The command that generated the page.
     pub command: String,
 }
 
 impl CampaignReport<'_> {
-    /// Builds the page.
+    /// Builds the page of the campaign.
     pub fn page(&self) -> Page {
         let mut sections = vec![self.said()];
         sections.extend(self.summaries.iter().enumerate().map(|(t, s)| summary(t, s)));
@@ -44,7 +47,7 @@ impl CampaignReport<'_> {
         Page { title: format!("Campaign {}", self.file.name), subtitle, sections }
     }
 
-    /// Section with the claims and with the differences between the tables and those of the paper.
+    /// Section with the verdicts on the claims, and with the differences between the tables and those of the paper.
     fn said(&self) -> Section {
         let sentence = |sentence: String| Finding { sentence, link: None };
         let claims = self
@@ -119,7 +122,7 @@ impl CampaignReport<'_> {
         figure
     }
 
-    /// Section with the numbers behind the tables, each with its seed and a link to its cell.
+    /// Section with the numbers behind the tables, each with its seed and a link to the command of its cell.
     fn runs(&self) -> Section {
         let columns =
             [("Cell", Left), ("Seed", Right), ("Row", Left), ("Quantity", Left), ("Value", Right)];
@@ -145,7 +148,7 @@ impl CampaignReport<'_> {
         Section::new("Numbers", note, vec![Figure::Table(table)])
     }
 
-    /// Section with the cells and their commands.
+    /// Section with the cells that have a result, and their commands.
     fn done(&self) -> Section {
         let columns = [
             ("Cell", Left),
@@ -187,7 +190,8 @@ impl CampaignReport<'_> {
     }
 }
 
-/// The interquartile mean of a column over the seeds at `steps`; `None` unless every seed has a value there.
+/// The interquartile mean over the seeds of the learning curves' column `column` at `steps`. `None` unless every seed has a
+/// value there.
 fn middle(records: &[&Record], column: &str, steps: f64) -> Option<Estimate> {
     let value = |record: &&Record| {
         let at = record.curve.get("steps")?.iter().position(|s| *s == steps)?;

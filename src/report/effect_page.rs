@@ -1,15 +1,16 @@
-//! Page of one effect: its catalogue entry and plots of its signature.
+//! Page about one effect: its entry in the catalogue of effects, and plots of its signature. The signature shows forces, moments
+//! and motions of a model with and without the effect.
 
 use super::{Align, Figure, Page, Section, Style, Table, XyFigure, XyMark, XySeries};
 use greylag_physics::effects::Description;
 use greylag_sysid::signature::{MANOEUVRE, Pair, Signature};
 
-/// Input of the page on one effect.
+/// Contents of the page about one effect.
 #[derive(Clone, Debug)]
 pub struct EffectReport<'a> {
     /// Catalogue description of the effect.
     pub about: Description,
-    /// Channels on which the effect acts, in words.
+    /// Text that names the channels (components of force and moment) on which the effect acts.
     pub channels: String,
     /// What the effect acts on: aerodynamics and body, deflections, or measurements.
     pub place: &'static str,
@@ -22,7 +23,7 @@ pub struct EffectReport<'a> {
 }
 
 impl EffectReport<'_> {
-    /// Builds the page.
+    /// Builds the page about the effect.
     pub fn page(&self) -> Page {
         let mut sections =
             vec![Section::new("", "", vec![Figure::Table(self.facts())]), self.parameters()];

@@ -1,4 +1,5 @@
-//! Page of an evaluation: scores next to those of the paper, step responses, and the planners' candidates.
+//! Page of an evaluation: scores beside those of the paper (T. Guerin et al., 2026), step responses, and the candidate plans of
+//! planners.
 
 pub(crate) mod answer;
 mod way;
@@ -23,9 +24,9 @@ pub struct EvaluationReport<'a> {
     pub subtitle: String,
     /// Results, one element per controller.
     pub evaluations: &'a [Evaluation],
-    /// Single flights: each target with one flight per evaluation, in the order of `evaluations`.
+    /// Single flights: each target with one flight of each controller, in the order of `evaluations`.
     pub flights: &'a [(Target, Vec<Tracking>)],
-    /// The next command for the user to run; empty if there is none.
+    /// The command that the user should run next; empty if there is none.
     pub next: String,
     /// Inputs of the evaluation, such as files and options, as pairs of name and value.
     pub provenance: Vec<(String, String)>,
@@ -46,7 +47,7 @@ impl EvaluationReport<'_> {
         Page { title: "Controllers".into(), subtitle: self.subtitle.clone(), sections }
     }
 
-    /// Section with the answer.
+    /// Section with the summary in sentences.
     fn verdict(&self) -> Section {
         let plain = |sentence: String| Finding { sentence, link: None };
         let mut lead: Vec<Finding> =
@@ -169,7 +170,7 @@ impl EvaluationReport<'_> {
         Section::new("Single flights", note, vec![Figure::Choice(choice)])
     }
 
-    /// Section on the planners' rollouts during the flights to the targets; `None` if no planner flew.
+    /// Section on the candidate plans that the planners simulated during the flights; `None` if no planner flew.
     fn sight(&self) -> Option<Section> {
         let mut options = Vec::new();
         for (target, flights) in self.flights {

@@ -1,4 +1,5 @@
-//! Page of learning curves: evaluations of policy trainings over steps and over time.
+//! The HTML page of learning curves. It shows the evaluations during the trainings of policies (neural-network controllers) over
+//! the steps of the training and over time. An evaluation flies to commanded attitudes, the targets.
 
 use super::Align::{Left, Right};
 use super::{
@@ -8,16 +9,16 @@ use crate::kit::curves::Range;
 use crate::kit::numbers::{number, percent};
 use greylag_learn::policy::learning_curve::{CurvePoint, best, knee, spread};
 
-/// A training with one or several seeds.
+/// A training that was run with one or several seeds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Training {
     /// Name that distinguishes this training from the others.
     pub name: String,
-    /// Name and evaluations of each seed, in time order; every seed has at least one evaluation.
+    /// For each seed: its name and its evaluations in time order, of which there is at least one.
     pub seeds: Vec<(String, Vec<CurvePoint>)>,
 }
 
-/// Trainings for comparison, as in Figure 2 of \[GSFM26\].
+/// The trainings to be compared on the page, as in Figure 2 of \[GSFM26\].
 #[derive(Clone, Debug)]
 pub struct LearningReport<'a> {
     /// Title of the page.
@@ -26,13 +27,13 @@ pub struct LearningReport<'a> {
     pub subtitle: String,
     /// The trainings on the page.
     pub trainings: &'a [Training],
-    /// The next command for the user to run.
+    /// The command that the page proposes to the user as the next one.
     pub next: String,
-    /// Inputs such as commands and files, as pairs of name and value.
+    /// Command lines, files and other inputs of the page, as pairs of name and value.
     pub provenance: Vec<(String, String)>,
 }
 
-/// A quantity of an evaluation, with the title and the axis label of its figure.
+/// A quantity of an evaluation, with title, axis label and axis scale of its figure.
 struct Quantity {
     title: &'static str,
     label: &'static str,
@@ -96,7 +97,7 @@ impl LearningReport<'_> {
         Page { title: self.title.clone(), subtitle: self.subtitle.clone(), sections }
     }
 
-    /// Section with one sentence on the best evaluation of each seed; the first sentence is prominent.
+    /// A section with one sentence on the best evaluation of each seed. The first sentence is emphasised.
     fn answer(&self) -> Section {
         let all = self.trainings.iter().flat_map(|t| t.seeds.iter().map(move |s| (t, s)));
         let said = all.filter_map(|(training, (seed, points))| {

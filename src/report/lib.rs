@@ -1,4 +1,4 @@
-//! The report: figures and tables as one HTML file that needs no network.
+//! Reports: pages of figures and tables, each in one HTML file that needs no network.
 //!
 //! A [`Page`] contains [`Section`]s under a title, and a section contains [`Figure`]s in order. [`Page::render`] converts a page
 //! to one string that includes styles, scripts and data.
@@ -9,7 +9,7 @@
 //! (`LearningReport`), an evaluation of controllers (`EvaluationReport`), and a campaign (`CampaignReport`). The embedded library
 //! uPlot 1.6.32 (MIT, `kit/assets/uPlot.LICENSE`) draws the plots in the browser.
 //!
-//! All [`TimeFigure`]s of a page have the same time axis: their zoom and their cursor are linked.
+//! All [`TimeFigure`]s of a page have the same time axis. Zoom and cursor are common to them.
 
 mod aircraft_page;
 #[cfg(feature = "study")]

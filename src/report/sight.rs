@@ -1,4 +1,5 @@
-//! Rollouts of a planner: candidates, plan, and computation time of each part of a control step.
+//! Figures about a planner at one control step: the simulated candidate plans (rollouts), the chosen plan, and the computation
+//! time of each phase of planning.
 
 use super::Align::Right;
 use super::{Figure, Style, Table, XyFigure, XyMark, XySeries};
@@ -6,19 +7,19 @@ use crate::kit::numbers::number;
 use greylag_control::insight::{Insight, Path};
 use greylag_model::STEP;
 
-/// Internal state of a planner at one control step.
+/// Data about a planner at one control step.
 #[derive(Clone, Debug)]
 pub struct Sight {
     /// Time of the step, s, on the page's time axis.
     pub time_s: f64,
     /// Commanded roll and pitch, rad.
     pub target: [f64; 2],
-    /// Rollouts and plan of the step.
+    /// Candidates and chosen plan of the step.
     pub insight: Insight,
 }
 
 impl Sight {
-    /// Figures of roll and pitch with the candidates and the plan.
+    /// Figures of roll and of pitch over time, with the candidates and the plan.
     pub(super) fn fans(&self) -> [Figure; 2] {
         [self.fan(0, "Roll"), self.fan(1, "Pitch")]
     }
@@ -63,7 +64,7 @@ impl Sight {
     }
 }
 
-/// Table of the computation times of each part of the steps, ms.
+/// Table of the computation time of each phase, ms, with one row for each control step.
 pub(super) fn phases<'a>(sights: impl IntoIterator<Item = &'a Sight>) -> Table {
     let mut sights = sights.into_iter().peekable();
     let mut columns = vec![("At (s)", Right)];

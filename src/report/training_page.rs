@@ -1,4 +1,6 @@
-//! Page of one training: error, history of loss and coefficients, and contribution of the residual.
+//! Page of the training of one grey-box model: its error, the history of loss and coefficients, and the residual.
+//!
+//! The prior is the physical part of the model, the residual the learned network that is added to it.
 
 use super::Align::{Left, Right};
 use super::{
@@ -22,13 +24,13 @@ pub struct TrainingReport<'a> {
     pub history: &'a [Moment],
     /// The trained coefficients.
     pub coefficients: &'a [Learned],
-    /// Errors of the prior without residual on the held-out flights.
+    /// Errors of the prior alone on the held-out flights (not used in the training), one for each prediction horizon.
     pub prior: &'a [Horizon],
-    /// Errors of the learned model on the held-out flights.
+    /// Errors of the trained model on the held-out flights, one for each horizon.
     pub learned: &'a [Horizon],
-    /// Map of the residual's contribution; `None` for a model without one.
+    /// Map of the residual over flight conditions; `None` for a model without residual.
     pub residual: Option<&'a ResidualMap>,
-    /// The next command for the user to run; empty if there is none.
+    /// The command that the user should run next; empty if there is none.
     pub next: String,
     /// Notes for the user.
     pub notes: &'a [String],
@@ -49,7 +51,7 @@ impl TrainingReport<'_> {
         Page { title: self.title.clone(), subtitle: self.subtitle.clone(), sections }
     }
 
-    /// Section on the change of the error at the two longest horizons.
+    /// Section on the change of the error at the two longest horizons that both models have.
     fn answer(&self) -> Section {
         let change = |(p, l): (&Horizon, &Horizon)| {
             let by = 100.0 * (l.rms / p.rms - 1.0);

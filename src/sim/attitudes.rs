@@ -1,5 +1,6 @@
-//! A flight of one minute towards random attitudes. Its results are the loss of the aircraft, the settled error and the error
-//! integral.
+//! A simulated flight of one minute towards random attitudes, 5 s each. Its result states whether the aircraft was lost, the
+//! settled error and the error integral. The settled error is the attitude error in the last second of each attitude: the mean
+//! of the RMS errors of roll and pitch.
 
 use rand::RngExt;
 use serde::Serialize;
@@ -17,25 +18,25 @@ use greylag_physics::Airframe;
 pub const LEGS: usize = 12;
 /// Number of steps for which each attitude is commanded: 5 s.
 const LEG: usize = 500;
-/// Number of steps at the end of each attitude over which the settled error is taken: 1 s.
+/// Number of steps at the end of each attitude over which the settled error is computed: 1 s.
 const SETTLED: usize = 100;
-/// Largest commanded roll and pitch, degrees, if the airframe's envelope allows them.
+/// Largest commanded |roll| and |pitch|, degrees. A narrower envelope of the airframe reduces them.
 const LARGEST_DEG: [f64; 2] = [40.0, 15.0];
 /// Id of the random stream of the attitudes.
 const ATTITUDES: u64 = 60;
 
-/// Largest |roll|, |pitch|, |angle of attack| and |sideslip|, rad. Beyond them an aircraft counts as lost: it is
-/// inverted or near vertical, or outside the validity of models.
+/// Largest |roll|, |pitch|, |angle of attack| and |sideslip|, rad. An aircraft beyond them counts as lost: it is inverted or
+/// near vertical, or its model is not valid there.
 const LOST: [f64; 4] = [1.75, 1.2, 0.5, 0.7];
 /// Range of the ratio of airspeed to cruise airspeed. An aircraft outside this range counts as lost.
 const LOST_SPEED: [f64; 2] = [0.45, 2.5];
 
-/// Result of one minute of flight.
+/// Result of the flight of one minute.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Minute {
     /// Time of the loss, s; `None` if the aircraft was not lost.
     pub lost_s: Option<f64>,
-    /// Mean over the attitudes of the settled error, degrees; 180 if the aircraft was lost.
+    /// Settled error, mean over the attitudes, degrees; 180 if the aircraft was lost.
     pub settled_deg: f64,
     /// Integral of |roll error| + |pitch error| over the flight, or up to the loss of the aircraft, ° s.
     pub integral_deg_s: f64,
@@ -56,8 +57,8 @@ pub fn attitudes(airframe: &Airframe, seed: u64, number: u64) -> [Target; LEGS] 
     })
 }
 
-/// Flies `controller` for a minute in `model`, towards the [`attitudes`] of `flight` (seed and number). After [`CHANGE_S`]
-/// the aircraft is replaced by `changed`.
+/// Flies `controller` for a minute in a simulation of `model`, towards the [`attitudes`] of `flight` (seed and number). If
+/// `changed` is given, it replaces the aircraft after [`CHANGE_S`].
 pub fn fly(
     model: &GreyBox,
     controller: &mut dyn Controller,
@@ -67,7 +68,7 @@ pub fn fly(
     fly_watched(model, controller, flight, changed, |_| {})
 }
 
-/// Like [`fly`]. Calls `watch` with each observation before the controller's command.
+/// Does the same as [`fly`] and calls `watch` with each observation, before the controller computes its command.
 pub fn fly_watched(
     model: &GreyBox,
     controller: &mut dyn Controller,

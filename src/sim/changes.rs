@@ -1,10 +1,10 @@
-//! Sudden changes of the aircraft in flight.
+//! Sudden changes of the aircraft in a simulated flight, such as a stuck surface.
 
 use greylag_model::{GreyBox, JoinError};
 use greylag_physics::Command;
 use greylag_physics::rigid_body::RigidBody;
 
-/// Time of the change after the start, s.
+/// Time of the change after the start of the flight, s.
 pub const CHANGE_S: f64 = 30.0;
 /// Mass after the change, as a multiple of the mass before.
 const MASS: f64 = 1.3;
@@ -14,13 +14,13 @@ const AFT: f64 = 0.05;
 /// A sudden change of the aircraft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// All moments and forces of the aileron fall to half.
+    /// The coefficients of rolling moment, yawing moment and side force due to the aileron (Clda, Cnda, CYda) fall to half.
     HalfAileron,
-    /// Mass and inertia rise by 30 %; the centre of gravity stays.
+    /// Mass and inertia rise by 30 %. The centre of gravity stays.
     Mass,
     /// The centre of gravity moves aft by 5 % of the mean chord.
     CentreOfGravity,
-    /// The left elevon jams, or the left aileron of an aircraft without elevons.
+    /// The left elevon jams. On an aircraft without elevons, the left aileron jams.
     StuckSurface,
 }
 
@@ -40,7 +40,7 @@ impl Change {
     }
 }
 
-/// An aircraft that changes in flight.
+/// An aircraft after a change.
 #[derive(Clone, Debug)]
 pub struct Changed {
     change: Change,
@@ -49,7 +49,8 @@ pub struct Changed {
 }
 
 impl Changed {
-    /// The aircraft of `model` after `change`. A stuck surface changes the commands, not the model.
+    /// The aircraft of `model` after `change`. A stuck surface does not change the model; [`command`](Changed::command)
+    /// represents it.
     ///
     /// # Errors
     /// If the model already has an effect that moves its centre of gravity.
@@ -85,15 +86,15 @@ impl Changed {
         &self.model
     }
 
-    /// The command that the surfaces follow when the controller gives `command`. A stuck surface keeps its deflection under
-    /// `stuck`, the command at the time of the change.
+    /// The command that the surfaces execute if the controller gives `command`. A stuck surface keeps the deflection that it has
+    /// under `stuck`, the command at the time of the change.
     pub fn command(&self, command: Command, stuck: Command) -> Command {
         if self.change != Change::StuckSurface {
             return command;
         }
         match self.elevons {
             Elevons::Yes => {
-                // the left elevon by the mixer: right = elevator + aileron, left = elevator − aileron
+                // the elevons are mixed as right = elevator + aileron, left = elevator − aileron
                 let left = stuck.elevator - stuck.aileron;
                 let right = command.elevator + command.aileron;
                 let (elevator, aileron) = (0.5 * (right + left), 0.5 * (right - left));

@@ -13,7 +13,7 @@ use greylag_physics::{Command, State};
 
 /// Number of bins in roll, and in pitch. Each pair of a roll bin and a pitch bin is used once before any pair is used again.
 const BINS: usize = 5;
-/// Largest |roll| and |pitch| of the targets, rad (Table II).
+/// Largest |roll| and |pitch| of the targets, rad (Table II of \[GSFM26\]).
 const ENVELOPE: [f64; 2] = [60.0 * DEGREE, 30.0 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// Number of 10 ms steps for which a random action is held. With a new random action at every step, the aircraft would never
@@ -57,7 +57,8 @@ impl Place {
         Target { roll, pitch: within(bin / BINS, ENVELOPE[1]), airspeed }
     }
 
-    /// Fraction of random actions in an episode with a controller: one half in rounds 0 and 1, and 0.5ⁿ in a later round n.
+    /// Probability of random actions in an interval of an episode with a controller: one half in rounds 0 and 1, and 0.5ⁿ in a
+    /// later round n.
     pub fn random_part(&self) -> f64 {
         0.5_f64.powi(self.round.clamp(1, 100) as i32)
     }
@@ -95,8 +96,8 @@ impl Wander {
     }
 }
 
-/// Flies an episode of [`STEPS`] steps. In randomly chosen intervals the actions are random, in the others they are those of
-/// `controller`. Without a controller all actions are random. The episode ends early if a state is not finite.
+/// Flies an episode of [`STEPS`] steps. In randomly chosen intervals of 0.25 s the actions are random; in the others `controller`
+/// acts. Without a controller all actions are random. The episode ends early if a state is not finite.
 ///
 /// # Errors
 ///
@@ -138,8 +139,8 @@ pub fn explore(
     Ok(Flight::from(samples))
 }
 
-/// A log sample: state, actuator positions and command at the same time. Without `command` the sample has the previous
-/// command.
+/// A log sample with the state, the actuator positions and the command of one instant. If `command` is `None`, the sample
+/// has the previous command.
 pub fn sample(seen: &Observation, command: Option<&Command>, target: &Target) -> Sample {
     let State { roll, pitch, airspeed, p, q, r, alpha, beta } = seen.state;
     let command = command.unwrap_or(&seen.previous[0]);

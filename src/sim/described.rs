@@ -1,16 +1,17 @@
-//! Applies the surfaces, motors and conditions of an airframe file to the simulator's aircraft.
+//! Applies the surfaces, motors and conditions of an airframe file to the simulator's aircraft. Conditions are JSBSim properties
+//! with constant values, such as a flap setting.
 
 use greylag_sitl::plant::{Mixing, Moved, PlantOptions};
 
 use greylag_physics::Airframe;
 use greylag_physics::mixer::{Does, Effector};
 
-/// Applies the surfaces, motors and conditions of `airframe` to `plant`. If no surface has a JSBSim property, the
-/// channels of JSBSim's aircraft are used. Properties that `plant` already sets are kept.
+/// Applies the surfaces, motors and conditions of `airframe` to `plant`. If no surface names a JSBSim property for its position,
+/// the simulated aircraft keeps its own controls. Properties that `plant` already sets keep their values.
 ///
 /// # Errors
 ///
-/// If some surfaces have a position property and others have none. The message names a surface without one.
+/// If some surfaces name a property for their position and others do not. The message names one of the latter.
 pub fn describe(plant: &mut PlantOptions, airframe: &Airframe) -> Result<(), String> {
     for (name, value) in &airframe.conditions {
         if plant.held.iter().all(|(held, _)| held != name) {
@@ -30,7 +31,7 @@ fn moved(effector: &Effector, plant: &PlantOptions) -> Result<Moved, String> {
     let Effector { name, does, gains, command, position, .. } = effector;
     let travel = match does {
         Does::Deflects(travel) => Some([travel.least, travel.most]),
-        // the motor of a file without [motors]
+        // this is the motor of an airframe file without a section [motors]
         Does::Pulls if position.is_none() && name == "throttle" => {
             return Ok(Moved::throttle(&plant.properties));
         }

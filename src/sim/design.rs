@@ -1,5 +1,6 @@
-//! Experiment design: finds the manoeuvre that best discriminates two effects. It simulates the manoeuvres with a model that
-//! has one of the effects and with a model that has the other.
+//! Experiment design: finds the manoeuvre that best discriminates two effects. An effect is a group of terms that a model may
+//! lack, such as stall. Each manoeuvre of a menu is simulated with the model plus one effect and with the model plus the
+//! other. [`Separation::apart`] measures how well the two effects are then told apart.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -22,9 +23,9 @@ use greylag_sysid::progress::{Cancelled, Progress, report};
 use greylag_sysid::separation::{Separation, separation};
 use greylag_sysid::weak_form::prepared::{ClockError, Prepared};
 
-/// Smallest `apart` of a `Separation` at which two effects count as discriminated.
+/// Smallest [`Separation::apart`] at which two effects count as discriminated.
 pub const ENOUGH: f64 = 10.0;
-/// Longest accepted duration of a plan, s.
+/// Flight time that a plan must not reach, s.
 pub const LONGEST_S: f64 = 600.0;
 /// Smallest number of flown manoeuvres: one on each of two opposite headings.
 const LEAST: f64 = 2.0;
@@ -62,12 +63,12 @@ pub enum DesignError {
 pub struct Suspect {
     /// Id of the effect.
     pub id: String,
-    /// Values of the effect's coefficients, in the effect's order. If the list is empty, values are used with which the effect is
-    /// clearly visible in a flight.
+    /// Values of the effect's coefficients, in the effect's order. An empty list stands for values that make the effect clearly
+    /// visible in a flight.
     pub values: Vec<f64>,
 }
 
-/// Expected discrimination of a manoeuvre of the menu.
+/// Predicted ability of a manoeuvre of the menu to discriminate the two effects.
 #[derive(Clone, Debug)]
 pub struct Prospect {
     /// Name of the manoeuvre.
@@ -75,29 +76,28 @@ pub struct Prospect {
     /// Length of the manoeuvre, s.
     pub duration_s: f64,
     /// Separation of the effects in a flight of the aircraft with the first effect, and in a flight with the second effect.
-    /// `None` if the aircraft would leave the bounds of a schedule.
+    /// `None` if the aircraft exceeds the roll or pitch that a schedule allows.
     pub separations: [Option<Separation>; 2],
 }
 
 impl Prospect {
-    /// The smaller of the two separations; `None` if one is missing.
+    /// The smaller [`Separation::apart`] of the two flights; `None` if one is missing.
     pub fn apart(&self) -> Option<f64> {
         let [a, b] = self.separations;
         Some(a?.apart.min(b?.apart))
     }
 
-    /// Flight time in which repetitions of this manoeuvre reach a separation of [`ENOUGH`], s; `None` if a separation is
-    /// missing.
+    /// Flight time in which repetitions of this manoeuvre reach [`ENOUGH`], s; `None` if a separation is missing.
     pub fn seconds(&self) -> Option<f64> {
         self.apart().map(|apart| self.duration_s * ENOUGH / apart)
     }
 }
 
-/// How well each manoeuvre of the menu discriminates the effects `suspects`, which are missing from `model`. The manoeuvre
-/// with the shortest flight time is first.
+/// Computes how well each manoeuvre of the menu discriminates the effects `suspects`, which `model` lacks. The manoeuvre
+/// that needs the shortest flight time is first.
 ///
 /// `controller` flies the manoeuvres. The separations are computed for the sensor noise of a small autopilot. `progress`
-/// gets the fraction of the manoeuvres that have been simulated.
+/// is called with the fraction of the manoeuvres that have been simulated.
 ///
 /// # Errors
 ///
@@ -137,13 +137,13 @@ pub fn prospects(
 /// A manoeuvre that discriminates two effects, repeated as often as necessary.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// The chosen manoeuvre.
+    /// The manoeuvre that is repeated.
     pub manoeuvre: &'static Manoeuvre,
-    /// Flight time in which the manoeuvre reaches a separation of [`ENOUGH`], s.
+    /// Flight time in which the manoeuvre reaches [`ENOUGH`], s.
     pub seconds: f64,
     /// Number of repetitions, on alternating headings.
     pub times: usize,
-    /// The complete schedule.
+    /// The schedule with all repetitions.
     pub schedule: Schedule,
 }
 
@@ -158,22 +158,22 @@ pub fn plan(prospects: &[Prospect], cruise_mps: f64) -> Option<Plan> {
     Some(Plan { manoeuvre, seconds, times, schedule })
 }
 
-/// Repeats a manoeuvre on alternating opposite headings. On a single heading, wind cannot be distinguished from an
-/// airspeed scale error.
+/// Repeats a manoeuvre on alternating opposite headings. On a single heading, the wind cannot be distinguished from a
+/// scale error of the airspeed.
 fn repeated(manoeuvre: &Manoeuvre, times: usize) -> Schedule {
     let again = |all: Schedule, _| all.then(menu::TURN.schedule()).then(manoeuvre.schedule());
     (1..times).fold(manoeuvre.schedule(), again)
 }
 
-/// `model` with the effect added.
+/// The model `model` with the effect added.
 fn truth(model: &GreyBox, suspect: &Suspect) -> Result<GreyBox, DesignError> {
     let mut with = model.clone();
     with.join(&suspect.id, &values(model, suspect)?)?;
     Ok(with)
 }
 
-/// Values of the effect's coefficients: the given values if there are any. Otherwise they are clearly visible values or, if
-/// these are unknown, the middle one of the search's starting values.
+/// Values of the effect's coefficients. They are the given values if there are any, else clearly visible values. If these are
+/// unknown, they are the middle one of the sets of starting values in the catalogue.
 fn values(model: &GreyBox, suspect: &Suspect) -> Result<Vec<f64>, DesignError> {
     if !suspect.values.is_empty() {
         return Ok(suspect.values.clone());
@@ -194,9 +194,9 @@ fn values(model: &GreyBox, suspect: &Suspect) -> Result<Vec<f64>, DesignError> {
     middle.ok_or_else(|| DesignError::Amplitude { id: id.into() })
 }
 
-/// Candidate models for fitting the effect to data of `model`. There is one list for the effect's own values and one for each
-/// set of starting values. A list has one copy of `model` for each linear coefficient that is not zero. An effect with fewer
-/// than two linear coefficients has one copy with the whole effect.
+/// Models by which [`separation`] fits the effect of `suspect`. There is one list for the effect's own values and one for each
+/// set of starting values in the catalogue. Within a list, each model is `model` with only one nonzero linear coefficient of
+/// the effect. An effect with fewer than two linear coefficients has a single model in a list, with the whole effect.
 ///
 /// # Errors
 ///
@@ -225,7 +225,8 @@ pub fn alternatives(model: &GreyBox, suspect: &Suspect) -> Result<Vec<Vec<GreyBo
     all.map(one).collect()
 }
 
-/// The flight along `schedule`, simulated with the model `truth`; `None` if it leaves the bounds of a schedule.
+/// The flight along `schedule`, simulated with the model `truth`. `None` if it exceeds the roll or pitch that a schedule
+/// allows, if the simulation fails, or if it is too short for an evaluation.
 fn imagine(
     truth: &GreyBox,
     controller: &dyn Controller,
@@ -273,7 +274,7 @@ fn imagine(
     Ok((!prepared.windows.is_empty()).then_some(prepared))
 }
 
-/// A noise-free log sample, with the specific force of `truth`.
+/// A log sample without noise. Its specific force is computed by the model `truth`.
 fn instant(truth: &GreyBox, seen: &Observation, memory: &mut InputMemory) -> Instant {
     let controls = seen.actuators.controls();
     let air = truth.air(&seen.state, seen.altitude);

@@ -1,4 +1,4 @@
-//! Environments for controllers: JSBSim, or a model in its place.
+//! Simulated environments in which controllers fly: JSBSim, or a model in its place.
 
 #[cfg(feature = "sitl")]
 use greylag_sitl::plant::PlantError;
@@ -8,10 +8,10 @@ use greylag_model::{GreyBox, Twin};
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{Command, State, Time};
 
-/// An environment cannot continue.
+/// Reason why an environment cannot continue.
 #[derive(Debug, thiserror::Error)]
 pub enum Trouble {
-    /// The plant reports an error.
+    /// The plant, which is the aircraft in JSBSim, reports an error.
     #[cfg(feature = "sitl")]
     #[error(transparent)]
     Plant(#[from] PlantError),
@@ -28,21 +28,21 @@ pub enum Trouble {
 
 /// A simulated world with steps of 0.01 s.
 pub trait Environment {
-    /// Resets to the neutral start.
+    /// Resets to the initial state of a flight and returns the first observation.
     ///
     /// # Errors
     ///
     /// If the plant cannot be set to this state.
     fn reset(&mut self) -> Result<Observation, Trouble>;
-    /// Advances one step under `command`, clamped to its ranges.
+    /// Advances one step under `command`, which is clamped to its ranges. Returns the observation after the step.
     ///
     /// # Errors
     ///
-    /// If a state is not finite.
+    /// If the command or a state is not finite.
     fn step(&mut self, command: Command) -> Result<Observation, Trouble>;
     /// Load factor at the present state: the specific force along body z, upwards, divided by the standard gravity.
     fn load_factor(&self) -> f64;
-    /// Sets the random seed from the next reset on; a deterministic environment has none.
+    /// Sets the seed of the random numbers from the next reset on. A deterministic environment ignores it.
     fn reseed(&mut self, _seed: u32) {}
 }
 
@@ -58,13 +58,13 @@ pub struct Imagined {
 }
 
 impl Imagined {
-    /// An aircraft simulated by `model`.
+    /// An aircraft simulated by `model` that starts at its reference airspeed and altitude.
     pub fn new(model: GreyBox) -> Imagined {
         let start = model.airframe.start();
         Imagined::starting(model, start)
     }
 
-    /// An aircraft simulated by `model` that starts at its cruise airspeed instead of its reference airspeed.
+    /// An aircraft simulated by `model` that starts at its cruise airspeed and reference altitude.
     pub fn cruising(model: GreyBox) -> Imagined {
         let airspeed = model.airframe.envelope.airspeed_cruise_mps;
         let start = State { airspeed, ..model.airframe.start() };
@@ -76,7 +76,7 @@ impl Imagined {
         Imagined { model, start, twin, previous: [Command::IDLE; 2], steps: 0 }
     }
 
-    /// Replaces the model; the state stays.
+    /// Replaces the model without changing the state.
     pub fn change(&mut self, model: GreyBox) {
         self.model = model;
     }

@@ -1,4 +1,4 @@
-//! One episode of the paper's protocol: 1000 steps from the neutral start to one target.
+//! One episode of the protocol of \[GSFM26\] (T. Guerin et al., 2026): 1000 steps from level flight at 16.67 m/s to one target.
 
 use std::time::{Duration, Instant};
 
@@ -13,23 +13,23 @@ pub use greylag_control::quality::{REACHED_DEG, attitude_error_deg};
 /// Number of steps of an episode: 10 s in steps of 10 ms (section V-E of \[GSFM26\]).
 pub const STEPS: usize = 1000;
 
-/// Number of steps over which the settled error is computed: the last fifth of an episode.
+/// Number of steps at the end of an episode from which the settled error is computed: the last fifth.
 pub const SETTLED: usize = 200;
 
-/// Settled error above which an episode counts as diverged, degrees (Table VIII).
+/// Settled error above which an episode counts as diverged, degrees (Table VIII of \[GSFM26\]).
 pub const DIVERGED_DEG: f64 = 10.0;
 
 /// Result of an episode.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// Mean of roll and pitch RMSE over the last fifth, degrees; 180 if the aircraft was lost.
+    /// Settled error: mean of roll and pitch RMSE over the last fifth, degrees; 180 if the aircraft was lost.
     pub settled_deg: f64,
-    /// Time after which roll and pitch stay within [`REACHED_DEG`] of the target, s. It is the whole duration if they
-    /// do not stay, or if the aircraft was lost.
+    /// Time after which roll and pitch stay within [`REACHED_DEG`] of the target, s. It is the whole duration if they do not
+    /// stay there, or if the aircraft was lost.
     pub settling_s: f64,
     /// Computing time of the controller for each scored step.
     pub cost: Vec<Duration>,
-    /// The track of the scored leg.
+    /// Measurements and commands of the scored leg.
     pub track: Track,
 }
 
@@ -43,7 +43,7 @@ pub struct Episode<'a> {
     pub seed: u64,
 }
 
-/// A target with its duration in steps.
+/// A commanded target and its duration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leg {
     /// Attitude and airspeed target.
@@ -66,7 +66,7 @@ impl Episode<'_> {
         self.fly_leg(None, Leg { target: *target, steps: STEPS }, watch)
     }
 
-    /// Flies `leg` and scores it. The leg starts at the end of `first`, which is not scored, or at the reset state if
+    /// Flies `leg` and scores it. The leg starts at the end of the leg `first`, which is not scored, or at the reset state if
     /// `first` is `None`. `watch` is called at every step of both legs.
     ///
     /// # Errors
@@ -158,7 +158,7 @@ mod tests {
 
     const TARGET: Target = Target { roll: 0.0, pitch: 0.0, airspeed: 16.67 };
 
-    /// An environment with the attitude `settled` (degrees) in the last fifth, which loses the aircraft at step
+    /// An environment in which the aircraft has the attitude `settled` (degrees) in the last fifth and is lost at step
     /// `lost_at`.
     struct Fake {
         step: usize,

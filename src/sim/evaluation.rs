@@ -1,4 +1,6 @@
-//! Evaluation of a controller on many targets, on all cores, summarised by group.
+//! Evaluation of a controller by flights to many targets (commanded attitudes), on all cores, summarised by groups of targets.
+//! The settled error of a flight is the mean of the RMS errors of roll and pitch over its last fifth; it is 180° if the aircraft
+//! was lost.
 
 use std::time::Duration;
 
@@ -20,7 +22,7 @@ use greylag_model::GreyBox;
 use greylag_num::statistics::{interquartile_mean, mean, quantile};
 use greylag_num::{bootstrap, stream};
 
-/// Seed of the bootstrap: the same scores give the same intervals.
+/// Seed of the bootstrap. It is fixed, so the same scores give the same intervals.
 const SEED: u64 = 95;
 
 /// Scores of a controller on the targets.
@@ -30,12 +32,12 @@ pub struct Evaluation {
     pub controller: String,
     /// Name of the model from which the controller was designed or with which it plans.
     pub model: String,
-    /// Scores by group. The group `all` joins easy targets and hard corners if both were flown: the 240 targets of the
-    /// paper's Table II.
+    /// Scores by group. The group `all` contains the easy targets and those in the hard corners, if both were flown: the 240
+    /// targets of the paper's Table II.
     pub groups: Vec<Score>,
     /// Computing time per step.
     pub ms_per_step: Cost,
-    /// The limits for the quality measures; `None` if the quality was not measured.
+    /// Envelope limits that the quality measures use; `None` if the quality was not measured.
     pub limits: Option<Limits>,
     /// Every flight with its quality measures, in the order of the targets; empty if the quality was not measured.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -47,7 +49,7 @@ pub struct Evaluation {
 pub struct Scored {
     /// Group of the target.
     pub targets: String,
-    /// Initial roll and pitch in degrees; `None` for the start of an episode.
+    /// Roll and pitch (degrees) that were commanded before the target. `None` if the flight starts at the start of an episode.
     pub from_deg: Option<[f64; 2]>,
     /// Target roll and pitch in degrees.
     pub to_deg: [f64; 2],
@@ -66,7 +68,7 @@ pub struct Score {
     pub count: usize,
     /// Mean settled error, degrees.
     pub mean_deg: f64,
-    /// 95 % bootstrap interval of the mean over the targets, degrees.
+    /// 95 % bootstrap interval of the mean, degrees. The bootstrap draws targets.
     pub mean_ci95_deg: [f64; 2],
     /// Median settled error, degrees.
     pub median_deg: f64,
@@ -80,18 +82,18 @@ pub struct Score {
     pub min_deg: f64,
     /// Largest settled error, degrees.
     pub max_deg: f64,
-    /// Median of the time after which the attitude stays within 1° of the target, s.
+    /// Median over the flights of the time after which the attitude stays within 1° of the target, s.
     pub settling_s: f64,
     /// Fraction of targets with more than 10° of settled error.
     pub divergence_rate: f64,
     /// 95 % bootstrap interval of the divergence rate.
     pub divergence_ci95: [f64; 2],
-    /// Fraction of the flights within the limits of load factor and angle of attack; NaN if the quality was not measured.
-    /// Transients are allowed, see [`TRANSIENT`](greylag_control::quality::TRANSIENT).
+    /// Fraction of the flights that stay within the limits of load factor and angle of attack; NaN if the quality was not
+    /// measured. Transients are allowed, see [`TRANSIENT`](greylag_control::quality::TRANSIENT).
     pub kept_rate: f64,
     /// Fraction of the flights that overshoot roll and pitch by at most 1° or 3 % of the step, whichever is larger.
     pub little_overshoot_rate: f64,
-    /// Summary of each quality measure by its id; empty if the quality was not measured.
+    /// Summary of each quality measure over the flights, by the id of the measure; empty if the quality was not measured.
     pub measures: Spreads,
 }
 
@@ -109,12 +111,12 @@ pub struct Cost {
 /// Function that makes a controller for a thread.
 pub type Make<'a> = &'a (dyn Fn() -> Box<dyn Controller> + Sync);
 
-/// Flies `rows` in JSBSim on all cores, with a controller of `make` on each thread. `done` is called after each flight.
-/// Every row has its own random stream, independent of the core and of the other rows.
+/// Flies to the targets `rows` in JSBSim, on all cores. Each thread has its own controller of `make`. `done` is called after
+/// each flight. Every row has its own random stream, independent of the core and of the other rows.
 ///
 /// # Errors
 ///
-/// If the plant cannot be built or reset.
+/// If the simulated aircraft cannot be built or reset.
 #[cfg(feature = "sitl")]
 pub fn evaluate(
     plant: &PlantOptions,
@@ -123,7 +125,7 @@ pub fn evaluate(
     seed: u32,
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<Outcome>, Trouble> {
-    // errors are reported before the first flight
+    // an aircraft that cannot be built is reported here, before the first flight
     Simulator::new(plant)?;
     let world = || Simulator::new(plant);
     fly(&world, make, &courses(rows, plant.start.airspeed_mps), seed, done)
@@ -146,11 +148,11 @@ pub fn evaluate_courses(
     fly(&|| Simulator::new(plant), make, courses, seed, done)
 }
 
-/// Flies `rows` in `model` instead of JSBSim, as [`evaluate`] does.
+/// Flies to the targets `rows` in a simulation of `model` instead of JSBSim, as [`evaluate`] does.
 ///
 /// # Errors
 ///
-/// No error occurs at present. The loss of an aircraft is a result.
+/// At present there is no error. The loss of an aircraft is a result and not an error.
 pub fn imagine(
     model: &GreyBox,
     make: Make,
@@ -160,7 +162,7 @@ pub fn imagine(
     imagine_courses(model, make, &courses(rows, model.airframe.reference.airspeed), seed)
 }
 
-/// Flies `courses` in `model`, as [`imagine`] flies targets.
+/// Flies `courses` in a simulation of `model`, as [`imagine`] flies targets.
 ///
 /// # Errors
 ///
@@ -179,13 +181,12 @@ pub fn imagine_courses(
 pub struct Robustness {
     /// The score over all draws.
     pub all: Evaluation,
-    /// For each draw: mean settled error, degrees, and the number of targets that diverged (settled error over
-    /// [`DIVERGED_DEG`]).
+    /// For each draw: mean settled error, degrees, and number of targets with a settled error over [`DIVERGED_DEG`].
     pub draws: Vec<(f64, usize)>,
 }
 
 impl Robustness {
-    /// Monte Carlo simulation over the uncertainty of `model`: flies `courses` in draws 0 to `draws` − 1 of the seed
+    /// Monte Carlo simulation of the uncertainty of `model`: flies `courses` in the random models 0 to `draws` − 1 of the seed
     /// `seed`, see [`GreyBox::drawn`]. `controller` and `name` are the names of the controller and of the model. `done` is
     /// called after each draw.
     ///
@@ -208,7 +209,7 @@ impl Robustness {
             let settled: Vec<f64> = flown.iter().map(|o| o.settled_deg).collect();
             let lost = settled.iter().filter(|deg| **deg > DIVERGED_DEG).count();
             each.push((mean(&settled), lost));
-            // the tracks of thousands of draws do not fit into memory
+            // only sums are kept, because the tracks of thousands of draws would not fit into memory
             all.take(courses, &flown, Some(&limits));
             done();
         }
@@ -216,16 +217,16 @@ impl Robustness {
     }
 }
 
-/// One flight of an evaluation: start, target, random stream.
+/// One flight of an evaluation. It consists of one or two legs; a leg is a target with a duration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Course {
     /// Index of the course in its set, from 0. The index selects the random stream.
     pub number: u32,
     /// Group of the target; `None` for steps between attitudes.
     pub group: Option<Group>,
-    /// Leg flown before the scored one; `None` for flights from the start of an episode.
+    /// Leg that is flown before the scored one; `None` if the scored leg begins at the start of an episode.
     pub first: Option<Leg>,
-    /// The scored leg.
+    /// The leg that is scored.
     pub leg: Leg,
 }
 
@@ -236,7 +237,7 @@ impl Course {
     }
 }
 
-/// Courses from the start of an episode to the targets `rows`, as in the paper, at `airspeed` (m/s).
+/// Courses from the start of an episode to the targets `rows`, as in the paper, with the commanded airspeed `airspeed` (m/s).
 pub fn courses(rows: &[Row], airspeed: f64) -> Vec<Course> {
     let course = |row: &Row| {
         let [roll, pitch] = [row.roll_deg, row.pitch_deg].map(f64::to_radians);
@@ -272,7 +273,7 @@ fn fly<E: Environment>(
         .collect()
 }
 
-/// Accumulates flights without their tracks.
+/// Accumulates the results of flights without their tracks.
 #[derive(Default)]
 struct Sums {
     flights: Vec<Flown>,
@@ -312,7 +313,7 @@ impl Sums {
             .into_iter()
             .map(|group| Score::new(group.name(), &of(&|g| g == Some(group))))
             .collect();
-        // "all" means the targets of Table II and requires that neither of its two groups is missing
+        // the group "all" is Table II of the paper and requires both of its groups
         if groups[..2].iter().all(|score| score.count > 0) {
             let table = |g| matches!(g, Some(Group::Easy | Group::HardCorners));
             groups.push(Score::new("all", &of(&table)));
@@ -335,14 +336,15 @@ impl Sums {
 }
 
 impl Evaluation {
-    /// Summarises `outcomes` of `rows` by the settled error alone.
+    /// Summarises `outcomes`, the results of flights to `rows`, without quality measures.
     pub fn new(controller: &str, model: &str, rows: &[Row], outcomes: &[Outcome]) -> Evaluation {
         let mut sums = Sums::default();
         sums.take(&courses(rows, f64::NAN), outcomes, None);
         sums.evaluation([controller, model], None)
     }
 
-    /// Summarises `outcomes` of `courses` with the quality measures for `limits`. `names` are those of controller and model.
+    /// Summarises `outcomes`, the results of `courses`, with the quality measures for `limits`. `names` are those of controller
+    /// and model.
     pub fn measured(
         names: [&str; 2],
         courses: &[Course],

@@ -1,4 +1,4 @@
-//! A flight test in JSBSim: a controller flies a schedule, and the true state of every step is stored.
+//! A flight test in JSBSim: a controller flies a schedule of attitudes and excitations. The true state of every step is stored.
 
 use greylag_sitl::plant::{PlantOptions, Truth};
 
@@ -7,9 +7,9 @@ use greylag_control::{Controller, Target};
 use greylag_manoeuvres::{PITCH_MAX_DEG, ROLL_MAX_DEG, Schedule, Scheduled};
 use greylag_physics::Command;
 
-/// Factor by which the excitation is multiplied after the aircraft has left the bounds of a schedule.
+/// Factor by which the excitation is multiplied before a flight is repeated.
 const GENTLER: f64 = 0.75;
-/// Number of flights after which the aircraft counts as unflyable.
+/// Largest number of flights of one schedule, with less and less excitation.
 const TRIES: usize = 7;
 
 /// A flight without sensor errors: truth and command of every step of 0.01 s.
@@ -29,10 +29,10 @@ pub enum FlightTestError {
     Trouble {
         /// Name of the schedule.
         schedule: String,
-        /// The simulator's error.
+        /// Error that the simulator reported.
         why: Box<Trouble>,
     },
-    /// The aircraft left the bounds of a schedule.
+    /// The aircraft exceeded the largest roll or pitch of a schedule, [`ROLL_MAX_DEG`] and [`PITCH_MAX_DEG`].
     #[error(
         "flying schedule {schedule}: the aircraft is at roll {roll_deg:.0}°, pitch {pitch_deg:.0}° \
          after {time_s:.1} s, outside {ROLL_MAX_DEG}° and {PITCH_MAX_DEG}°; use a smaller hidden \
@@ -54,7 +54,8 @@ pub enum FlightTestError {
 ///
 /// # Errors
 ///
-/// If the plant cannot be built, a state is not finite, or the aircraft leaves the bounds of a schedule.
+/// If the simulator reports an error, such as a state that is not finite, or the aircraft exceeds the largest roll or pitch of a
+/// schedule.
 pub fn fly(
     plant: &PlantOptions,
     controller: &dyn Controller,
@@ -85,8 +86,8 @@ pub fn fly(
     Ok(flown)
 }
 
-/// Flies `schedule` like [`fly`]. If the aircraft leaves the bounds of a schedule, the flight is repeated with less
-/// excitation, up to six times.
+/// Flies `schedule` like [`fly`]. If the aircraft exceeds the largest roll or pitch, the flight is repeated with less excitation,
+/// up to six times.
 ///
 /// # Errors
 ///

@@ -1,4 +1,5 @@
-//! JSBSim as a training environment with one aircraft: the first training regime of \[GSFM26\].
+//! JSBSim as a training environment of a policy, with one aircraft: the first training regime of \[GSFM26\] (T. Guerin et al.,
+//! 2026, see `src/lib.rs`).
 
 use greylag_sitl::plant::PlantOptions;
 
@@ -12,7 +13,7 @@ use greylag_control::{Observation, Target};
 use greylag_num::{Lanes, Real};
 use greylag_physics::State;
 
-/// One aircraft in JSBSim as an environment.
+/// One aircraft in JSBSim as a training environment. Each episode has one target attitude.
 pub struct Flown {
     simulator: Simulator,
     seen: Observation,
@@ -23,7 +24,7 @@ pub struct Flown {
 }
 
 impl Flown {
-    /// An aircraft in its initial state, with the next target of `targets`.
+    /// An aircraft in its initial state. Its target is the next one of `targets`.
     ///
     /// # Errors
     ///
@@ -59,7 +60,8 @@ impl World for Flown {
     }
 
     fn step(&mut self, _block: usize, action: &[Block; ACTIONS]) -> Result<Stepped, Trouble> {
-        // if a state is not finite, the aircraft counts as lost, and its last finite state is used
+        // If the simulator fails, for instance because a state is not finite, the aircraft counts as lost. Its state is
+        // then that of the step before.
         let left = match self.simulator.step(command(action.map(|x| x.0[0].into()))) {
             Ok(seen) => {
                 self.seen = seen;

@@ -1,6 +1,7 @@
-//! Translates an effect file's formulas to JSBSim functions.
+//! Translates the formulas of an effect file to functions of JSBSim. The simulated aircraft then has the effect.
 //!
-//! Only the expression tree is shared with the effect. JSBSim evaluates the functions with its own code.
+//! The translation shares only the parsed expressions with Greylag's own effect. JSBSim evaluates the functions with its own
+//! code.
 
 use greylag_sitl::hidden::{Filter, FilterKind, Hidden, Place};
 
@@ -16,7 +17,7 @@ const LONGEST: usize = 200_000;
 /// Metres in a foot.
 const FT: f64 = 0.3048;
 
-/// The functions of `effect` in JSBSim's syntax, with `values` of its coefficients.
+/// Returns the functions of `effect` in JSBSim's syntax, with `values` as the values of its coefficients.
 ///
 /// # Errors
 ///
@@ -33,7 +34,8 @@ pub fn hidden(effect: &Written, values: &[f64]) -> Result<Hidden, String> {
     Ok(Hidden::written(effect.about.id, functions, writer.filters))
 }
 
-/// The axis of JSBSim to which a channel belongs, and JSBSim's unit (lbf or lbf ft) in N or N m.
+/// The axis of JSBSim to which a channel (component of force or moment) belongs, and the size of JSBSim's unit (lbf or lbf ft)
+/// in N or N m.
 fn place(channel: Channel) -> (Place, f64) {
     match channel {
         Channel::Drag => (Place::Drag, LBF),
@@ -113,7 +115,7 @@ fn hat(rate: &str, per: &str) -> String {
     element("product", &[property(rate), property(per)])
 }
 
-/// Writes formulas and collects the filters that they read.
+/// Writes formulas, and collects the filters (lags and delays) whose outputs they read.
 struct Writer<'a> {
     /// Values of the effect's parameters.
     values: &'a [f64],
@@ -129,7 +131,7 @@ impl Writer<'_> {
             Node::Power(base, n) => Ok(element("pow", &[self.xml(base)?, number(f64::from(*n))])),
             Node::Table(x, points) => {
                 let x = self.xml(x)?;
-                // the length is checked before writing, because every pair of points repeats `x`
+                // the length is checked before the table is written, because every pair of points repeats `x`
                 match x.len().saturating_mul(points.len()) > LONGEST {
                     true => Err(too_long()),
                     false => Ok(table(&x, points)),

@@ -1,4 +1,5 @@
-//! Many aircraft simulated at once, with the model evaluated in SIMD lanes (section IV-B of \[GSFM26\]).
+//! Many aircraft simulated at once by a model in SIMD lanes, for the training of policies (section IV-B of \[GSFM26\], T.
+//! Guerin et al., 2026).
 
 use std::sync::Arc;
 
@@ -13,14 +14,14 @@ use greylag_physics::actuators::Actuators;
 use greylag_physics::inputs::InputMemory;
 use greylag_physics::{Controls, State};
 
-/// Aircraft per block of lanes.
+/// Number of aircraft in a block, one per SIMD lane.
 pub const WIDTH: usize = ROW;
 
 /// Number of steps of an episode, 10 ms each. Episodes in JSBSim have the same number.
 pub const STEPS: u32 = 1000;
 
-/// Validity limits of the model. An episode ends when θ, α or β (rad), a rate p, q, r (rad/s) or the airspeed (m/s) exceeds
-/// its limit.
+/// Validity limits of the model. An episode ends when |θ|, |α| or |β| (rad), |p|, |q| or |r| (rad/s) exceeds its limit, or when
+/// the airspeed (m/s) leaves its range.
 const ENVELOPE: Envelope =
     Envelope { pitch: 1.48, incidence: 1.0, rate: 25.0, airspeed: [4.0, 60.0] };
 
@@ -37,13 +38,13 @@ struct Envelope {
 pub enum Ended {
     /// The episode continues.
     No,
-    /// The episode was truncated by the time limit. The step is not terminal, and its value is bootstrapped.
+    /// The episode was truncated by the time limit. The critics' value of the next state replaces the missing rewards.
     Time,
     /// Terminated: a validity limit was exceeded.
     Lost,
 }
 
-/// Result of one step of a block, before ended episodes are reset.
+/// Result of one step of a block, before episodes that have ended are reset.
 #[derive(Clone, Copy, Debug)]
 pub struct Stepped {
     /// Observation after the step.
@@ -54,11 +55,11 @@ pub struct Stepped {
     pub ended: [Ended; WIDTH],
 }
 
-/// Many aircraft simulated by a model at once, for training. Each has its own target, actuator filters and episode. A single
-/// aircraft for a controller is [`Imagined`](crate::environment::Imagined).
+/// Many aircraft simulated by a model at once. Each has its own target, actuator filters and episode.
+/// [`Imagined`](crate::environment::Imagined) simulates a single aircraft for a controller.
 ///
-/// The state includes the complete memories of the actuator filters. The air density is constant, since it would change
-/// by less than 1 % over an episode.
+/// The state includes the complete memories of the actuator filters. The air density is constant, because it would change by
+/// less than 1 % in an episode.
 #[derive(Clone, Debug)]
 pub struct Imagination {
     model: Arc<GreyBox>,
@@ -82,7 +83,8 @@ struct Batch {
 }
 
 impl Imagination {
-    /// `instances` aircraft of `model` at the neutral start. `targets` supplies the target of each episode.
+    /// `instances` aircraft of `model` in level flight at the start of an episode. `targets` supplies the target of each
+    /// episode.
     pub fn new(model: Arc<GreyBox>, instances: usize, targets: Stratified) -> Imagination {
         let lane = Block::from_f64;
         let (state, rest) = (model.airframe.start(), Controls::default());
@@ -114,7 +116,7 @@ impl Imagination {
         imagination
     }
 
-    /// Starts new episodes. Their targets follow the first `targets` ones of the random sequence.
+    /// Starts new episodes. Their targets are those of the random sequence after the first `targets`.
     pub fn restart(&mut self, targets: u64) {
         self.targets.go_on_after(targets);
         for k in 0..self.batches.len() {
@@ -145,7 +147,7 @@ impl Imagination {
         self.batches.len()
     }
 
-    /// Number of episodes started, and number of episodes that ended outside the validity limits.
+    /// Number of episodes started, and number of episodes that ended at a validity limit.
     pub fn episodes(&self) -> [u64; 2] {
         [self.targets.count(), self.lost]
     }
@@ -197,8 +199,8 @@ impl Batch {
         }
     }
 
-    /// One step in the simulator's order: the state advances under the present actuators, then the actuators take the
-    /// command. Returns observation, reward, and 1 where a limit is exceeded.
+    /// One step in the simulator's order: the state advances under the present actuators, then the actuators receive the
+    /// command. Returns observation, reward, and 1 where a validity limit is exceeded.
     #[inline(always)]
     fn advance(
         &mut self,
@@ -233,13 +235,13 @@ fn wrapped(roll: Block) -> Block {
     Block::where_less(roll, -half, roll + turn, roll)
 }
 
-/// 1 where a state is outside the episode's limits or not finite, else 0.
+/// 1 where a state is outside the validity limits or not finite, else 0.
 #[inline(always)]
 pub fn outside(state: &State<Block>) -> Block {
     ENVELOPE.left(state)
 }
 
-/// Smallest and largest value of each state in an episode: rad, rad/s, m/s.
+/// Smallest and largest value of each state within the validity limits: rad, rad/s, m/s.
 pub fn bounds() -> [State; 2] {
     let Envelope { pitch, incidence, rate, airspeed: [slow, fast] } = ENVELOPE;
     let roll = std::f64::consts::PI;
@@ -250,7 +252,7 @@ pub fn bounds() -> [State; 2] {
 }
 
 impl Envelope {
-    /// 1 where a state is outside or not finite, else 0.
+    /// 1 where a state is outside the limits or not finite, else 0.
     #[inline(always)]
     fn left(&self, s: &State<Block>) -> Block {
         let inside = |x: Block, most: f64, others: Block| {

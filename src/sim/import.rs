@@ -1,4 +1,5 @@
-//! Imports a JSBSim aircraft as airframe and model, by central differences of its loads.
+//! Imports a JSBSim aircraft: writes an airframe file and a model file, with derivatives from central differences of the forces
+//! and moments.
 
 mod effects;
 mod files;
@@ -26,12 +27,12 @@ const FT: f64 = 0.3048;
 const ALPHA: f64 = 0.052;
 /// Half interval of angles, rad: 2°.
 const ANGLE: f64 = 0.035;
-/// Larger sideslip at which the drag is evaluated a second time, rad: 8°.
+/// Larger sideslip, at which the drag is evaluated a second time, rad: 8°.
 const FAR: f64 = 4.0 * ANGLE;
 /// Half interval of the dimensionless rates pb/2V, qc/2V and rb/2V.
 const RATE: f64 = 0.005;
-/// Pitch angle of the second attitude for the derivatives with respect to α̇, rad: 60°. Gravity curves the flight path there
-/// less than in level flight.
+/// Pitch angle of the second attitude for the derivatives with respect to α̇, rad: 60°. At this pitch angle, gravity curves the
+/// flight path less than in level flight.
 const ATTITUDE: f64 = 1.05;
 /// Half interval of surface commands (−1..1).
 const COMMAND: f64 = 0.2;
@@ -53,7 +54,7 @@ pub struct Imported {
 }
 
 impl Imported {
-    /// Adds `held`, the JSBSim properties that are held constant with their values, to the airframe file.
+    /// Adds JSBSim properties that are held constant to the airframe file. `held` has their names and values.
     pub fn hold(&mut self, held: &[(String, f64)]) {
         if !held.is_empty() {
             self.airframe.push_str("\n# Held in the simulator: the model is of the aircraft in this condition.\n[conditions]\n");
@@ -64,7 +65,7 @@ impl Imported {
     }
 }
 
-/// An aircraft cannot be imported.
+/// Reason why an aircraft cannot be imported.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
     /// The simulator cannot load or evaluate the aircraft.
@@ -84,13 +85,13 @@ pub enum ImportError {
         /// Deflection at the command 1, rad.
         most: f64,
     },
-    /// A measure of the wing is missing or not positive, so the coefficients have no scale.
+    /// A reference dimension of the wing is missing or not positive. The coefficients cannot be made dimensionless without it.
     #[error(
         "the {what} of the aircraft ({property}) is {value}: coefficients need one above zero; state it in the section metrics of the \
          aircraft's file"
     )]
     Wing {
-        /// What is measured.
+        /// Name of the dimension, such as `wing span`.
         what: &'static str,
         /// Name of the property in JSBSim.
         property: &'static str,
@@ -107,7 +108,7 @@ pub enum ImportError {
     },
 }
 
-/// The aircraft under evaluation.
+/// The aircraft that is imported, with its reference dimensions.
 struct Subject<'a> {
     plant: &'a mut Plant,
     start: Start,
@@ -123,8 +124,8 @@ struct Subject<'a> {
 /// Coefficients of drag, side force and lift (wind axes), and of rolling, pitching and yawing moment (body axes).
 type Coefficients = [f64; 6];
 
-/// Imports the aircraft of `plant` as the aircraft `name`, from its loads about the airspeed `cruise` (m/s) and the
-/// altitude `altitude` (m).
+/// Imports the aircraft of `plant` under the name `name`. Its forces and moments are evaluated at the airspeed `cruise` (m/s)
+/// and the altitude `altitude` (m).
 ///
 /// # Errors
 ///
@@ -222,13 +223,14 @@ struct Slopes {
     aileron: Coefficients,
     elevator: Coefficients,
     rudder: Option<Coefficients>,
-    /// Derivatives of the drag coefficient with respect to |β| and β². `drag_elevator` is that with respect to |elevator|.
+    /// Derivatives of the drag coefficient with respect to |β| and β².
     drag_beta: [f64; 2],
+    /// Derivative of the drag coefficient with respect to |elevator deflection|.
     drag_elevator: f64,
 }
 
 impl Subject<'_> {
-    /// Coefficients in `state` with the surfaces at `inputs`.
+    /// Coefficients in the state `state` with the commands `inputs`.
     fn at(&mut self, state: &Start, inputs: &Inputs) -> Result<Coefficients, PlantError> {
         let loads = self.plant.loads(state, inputs)?;
         let pressure = self.pressure(&loads);
@@ -253,7 +255,7 @@ impl Subject<'_> {
         Ok(std::array::from_fn(|k| all[k] - rate * self.alpha_rate[k]))
     }
 
-    /// α̇c/2V in JSBSim's definition.
+    /// Dimensionless rate α̇c/2V of the angle of attack, with JSBSim's α̇.
     fn incidence_rate(&mut self, airspeed: f64) -> Result<f64, PlantError> {
         let rate = self.plant.property("aero/alphadot-rad_sec")?;
         Ok(rate * self.chord / (2.0 * airspeed))
@@ -285,7 +287,7 @@ impl Subject<'_> {
         [drag, side, lift, moments[0], moments[1], moments[2]].map(|c| c / pressure)
     }
 
-    /// Lift, drag and pitching moment over the angle of attack, and the largest lift coefficient.
+    /// Coefficients of lift, drag and pitching moment over the angle of attack, and the largest lift coefficient.
     fn polar(&mut self) -> Result<(Polar, f64), PlantError> {
         let alpha: Vec<f64> = TABLE_DEG.iter().map(|a| a.to_radians()).collect();
         let mut polar = Polar { alpha, lift: vec![], drag: vec![], pitch: vec![] };
@@ -300,8 +302,8 @@ impl Subject<'_> {
         Ok((polar, most))
     }
 
-    /// Evaluates the coefficients on both sides of the reference state. `of` sets the two states and inputs. Returns the
-    /// central difference of the coefficients per `unit`, and their mean.
+    /// Evaluates the coefficients at two points on both sides of the reference state; `of` sets the state and inputs of each
+    /// from its sign. Returns the difference of the coefficients divided by 2 `unit`, and their mean.
     fn slope(
         &mut self,
         unit: f64,
@@ -320,7 +322,7 @@ impl Subject<'_> {
         Ok((odd, even))
     }
 
-    /// Derivatives of the coefficients about the reference state.
+    /// Derivatives of the coefficients about the reference state, which is straight flight at the angle of attack [`ALPHA`].
     fn slopes(&mut self, travel: &Travel) -> Result<Slopes, PlantError> {
         let base = self.at(&Start { alpha_rad: ALPHA, ..self.start }, &Inputs::default())?;
         let v = self.start.airspeed_mps;
@@ -348,7 +350,8 @@ impl Subject<'_> {
         })
     }
 
-    /// Frequency (rad/s) and damping of aileron, elevator and rudder, then the throttle's lag (s).
+    /// Natural frequency (rad/s) and damping ratio of aileron, elevator and rudder, then the time constant of the throttle (s).
+    /// They are fitted to a step response.
     fn lags(&mut self, travel: &Travel) -> Result<([[f64; 2]; 3], f64), PlantError> {
         let mut traces = [[0.0; 4]; 40];
         self.plant.reset(&self.start.clone())?;

@@ -1,4 +1,4 @@
-//! Installation and calibration errors of instruments, applied to a log.
+//! Installation and calibration errors of an aircraft's instruments. They are applied to the log of a simulated flight.
 
 use std::f64::consts::TAU;
 
@@ -7,15 +7,15 @@ use rand::RngExt;
 use greylag_logs::{Flight, Sample};
 use greylag_num::stream::stream;
 
-/// Id of the random stream from which the errors are drawn.
+/// Number that separates the random stream of these errors from others with the same seed.
 const DRAW: u64 = 73;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// Installation and calibration errors. [`Installation::TRUE`] has none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Installation {
-    /// Rotation vector from body axes to the axes of the sensor board, rad, in body axes. Rates, specific force and
-    /// attitude are measured in board axes.
+    /// Rotation vector from the body axes to the axes of the sensor board, rad, in body axes. Body rates, specific force and
+    /// attitude are measured in the board's axes.
     pub tilt: [f64; 3],
     /// Relative gain errors of the gyros p, q, r.
     pub gyro_gain: [f64; 3],
@@ -25,11 +25,11 @@ pub struct Installation {
     pub vane_gain: [f64; 2],
     /// Airspeed bias, m/s.
     pub airspeed_offset: f64,
-    /// Time constant of the pitot tubes, s.
+    /// Time constant of the airspeed measurement's first-order lag, s.
     pub airspeed_lag: f64,
     /// Offset of the measured heading, rad.
     pub heading_offset: f64,
-    /// Delay of the velocity over ground, s.
+    /// Delay of the measured velocity over ground, s.
     pub velocity_late: f64,
 }
 
@@ -52,9 +52,9 @@ impl Installation {
         velocity_late: 0.0,
     };
 
-    /// Draws one error from `seed` and returns it with its name. The error is a board rotation of 1° to 3° about one
-    /// axis, a gain error of 3 % to 10 %, an airspeed bias of 0.5 to 1.5 m/s, an airspeed lag or a velocity delay of
-    /// 0.05 to 0.2 s, or a heading error of 3° to 8°.
+    /// Draws a single error from `seed` and returns its name and the installation with this error. It is one of these: a
+    /// rotation of the board by 1° to 3° about one axis, a gain error of 3 % to 10 % in one channel, an airspeed bias of 0.5 to
+    /// 1.5 m/s, an airspeed lag or a velocity delay of 0.05 to 0.2 s, or a heading offset of 3° to 8°.
     pub fn one(seed: u64) -> (&'static str, Installation) {
         let mut random = stream(seed, &[DRAW]);
         let kind = random.random_range(0..7_usize);
@@ -99,7 +99,7 @@ impl Installation {
         (name, all)
     }
 
-    /// Applies the errors to `log`.
+    /// Changes `log` to what the instruments with these errors would have recorded.
     pub fn apply(&self, log: &mut Flight) {
         self.delay(&mut log.samples);
         let turn = turned(self.tilt);
@@ -119,7 +119,7 @@ impl Installation {
         }
     }
 
-    /// Applies the first-order lag of the airspeed and the delay of the velocity.
+    /// Applies the lag of the airspeed and the delay of the velocity.
     fn delay(&self, samples: &mut [Sample]) {
         let velocity: Vec<([f64; 3], f64)> =
             samples.iter().map(|s| (s.velocity_ned_mps, s.time_s)).collect();
@@ -146,7 +146,7 @@ fn product(a: &Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
-/// Rotation by the vector `by` (rad): Rodrigues' formula.
+/// Matrix of the rotation by the rotation vector `by` (rad), from Rodrigues' formula.
 fn turned(by: [f64; 3]) -> Matrix {
     let angle = by.iter().map(|x| x * x).sum::<f64>().sqrt();
     let [x, y, z] = by;
@@ -163,7 +163,7 @@ fn turned(by: [f64; 3]) -> Matrix {
     })
 }
 
-/// Rotation from body to earth axes for roll, pitch, yaw (rad).
+/// Matrix of the rotation from body to earth axes for roll, pitch and yaw (rad).
 fn from_euler([roll, pitch, yaw]: [f64; 3]) -> Matrix {
     let about = |axis: usize, angle: f64| {
         let mut by = [0.0; 3];
@@ -173,12 +173,14 @@ fn from_euler([roll, pitch, yaw]: [f64; 3]) -> Matrix {
     product(&product(&about(2, yaw), &about(1, pitch)), &about(0, roll))
 }
 
-/// Roll, pitch, yaw (rad) of a rotation from body to earth axes. Roll and yaw are undefined in vertical flight.
+/// Roll, pitch and yaw (rad) of the rotation matrix `m` from body to earth axes. Roll and yaw are undefined if the nose points
+/// straight up or down.
 fn to_euler(m: &Matrix) -> [f64; 3] {
     [m[2][1].atan2(m[2][2]), (-m[2][0]).clamp(-1.0, 1.0).asin(), m[1][0].atan2(m[0][0])]
 }
 
-/// The velocity at `time` (s), linearly interpolated. Outside the samples it is the velocity of the nearest sample.
+/// The velocity at `time` (s), interpolated linearly in `past`, pairs of velocity and time (s). Outside their times it is the
+/// velocity of the nearest pair.
 fn late(past: &[([f64; 3], f64)], time: f64) -> [f64; 3] {
     let after = past.iter().rposition(|(_, t)| *t <= time).map_or(0, |k| k + 1);
     let (Some(before), Some(next)) =

@@ -1,4 +1,6 @@
-//! Simulation and scoring of controllers: environments, targets, episodes, evaluations, flight tests.
+//! Simulation and scoring of controllers. An environment is JSBSim or a learned model. An episode is one flight in it to a
+//! target, a commanded attitude. An evaluation scores a controller over many episodes. Flight tests produce logs for
+//! identification.
 
 #[cfg(feature = "sitl")]
 pub mod collect;
@@ -51,5 +53,5 @@ pub use episode::{Episode, Outcome};
 pub use simulator::Simulator;
 pub use targets::{Group, TargetFile};
 
-/// Altitude at the start of an episode, m.
+/// Altitude above sea level at the start of an episode, m.
 pub const START_ALTITUDE: f64 = 600.0;

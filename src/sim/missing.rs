@@ -1,4 +1,4 @@
-//! An effect that the JSBSim aircraft has and a model lacks, as a test case of diagnosis.
+//! An effect that the aircraft in JSBSim has and a model lacks. A diagnosis is tested by whether it finds this effect.
 
 use greylag_sitl::hidden::{Hidden, HiddenError};
 use rand::RngExt;
@@ -11,27 +11,27 @@ use greylag_physics::formula::Written;
 /// Id of the random stream of missing effects.
 const DRAW: u64 = 80;
 
-/// Factors that scale the amplitudes in [`KINDS`], which are those of one aircraft, to another aircraft.
+/// Factors that scale the amplitudes in [`KINDS`], which are given for the Skywalker X8, to another aircraft.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Craft {
-    /// Factors on amplitudes by unit: N, m, N m, N m s, kg m².
+    /// Factors on amplitudes in N, m, N m, N m s and kg m², in this order.
     force: f64,
     length: f64,
     moment: f64,
     momentum: f64,
     inertia: f64,
-    /// Factor on the decay of thrust with airspeed. Its square applies to surface effectiveness.
+    /// Factor on the decay of thrust with airspeed. Its square applies to the aeroelastic loss of surface effectiveness.
     airspeed: f64,
     /// Factor on the stiffness in pitch.
     stiffness: f64,
-    /// CDbeta, CDbeta2 and CDde of the aircraft's own file, to which a hidden amplitude is added.
+    /// CDbeta, CDbeta2 and CDde that the aircraft has in its own file.
     own: [f64; 3],
     /// Ids of effects that can be removed from the model.
     has: Vec<String>,
 }
 
 impl Craft {
-    /// The factors for the aircraft of `reference`, the model that matches the simulator.
+    /// The factors for the aircraft of `reference`, the model that describes the simulated aircraft.
     pub fn of(reference: &GreyBox) -> Craft {
         let value = |name: &str| {
             reference.coefficients().iter().find(|c| c.name == name).map_or(0.0, |c| c.value)
@@ -60,20 +60,20 @@ impl Craft {
         }
     }
 
-    /// The factors for the aircraft of `model`, for which `Craft::kinds` has every effect of [`KINDS`].
+    /// The factors for the aircraft of `model`. `Craft::kinds` then has every effect of [`KINDS`], even if `model` lacks it.
     pub fn lacking(model: &GreyBox) -> Craft {
         let own = ["lift_table", "drag_beta2", "drag_elevator_abs"].map(str::to_owned);
         let craft = Craft::of(model);
         Craft { has: craft.has.iter().cloned().chain(own).collect(), ..craft }
     }
 
-    /// Whether the reference has the effect `id`.
+    /// Whether the model given to [`Craft::of`] has the effect `id`.
     fn has(&self, id: &str) -> bool {
         self.has.iter().any(|has| has == id)
     }
 
-    /// All effects that can be missing, with this aircraft's amplitudes. Some effects replace one of the aircraft's own
-    /// effects. They are included only if the reference has the replaced effect.
+    /// All effects that can be missing, with amplitudes for this aircraft. Some of them take the place of an effect that the
+    /// model has. They are included only if the model has that effect.
     pub fn kinds(&self) -> Vec<MissingKind> {
         let own = |kind: &&MissingKind| match kind.id {
             "lift_stall" => self.has("lift_table"),
@@ -106,7 +106,7 @@ impl Craft {
     }
 }
 
-/// Properties of an aircraft from which amplitudes are scaled.
+/// Properties of an aircraft by which amplitudes are scaled.
 struct Sizes {
     mass: f64,
     chord: f64,
@@ -149,11 +149,11 @@ const fn both(id: &'static str, unit: &'static str, clear: [f64; 2]) -> MissingK
     MissingKind { id, unit, clear, either_sign: true }
 }
 
-/// Effects that can be missing if the aircraft's model has them. They are removed from the model; the simulator is unchanged.
+/// Effects that can be missing if the aircraft's model has them. They are removed from the model. The simulator stays as it is.
 const OF_THE_MODEL: [MissingKind; 2] =
     [kind("rudder_linear", "", [1.0, 1.0]), kind("propeller", "", [1.0, 1.0])];
 
-/// Effects that can be missing from any aircraft, with amplitudes for the size of the X8.
+/// The other effects that can be missing, with amplitudes for the size of the X8.
 pub const KINDS: [MissingKind; 26] = [
     kind("drag_alpha2", "1/rad²", [0.6, 1.2]),
     kind("drag_beta2", "1/rad²", [0.5, 1.2]),
@@ -199,7 +199,7 @@ impl MissingKind {
         self.allowed(rounded(signed))
     }
 
-    /// The largest |amplitude| at which the aircraft still follows its schedule; the smallest one for a rate limit.
+    /// The largest |amplitude| at which the aircraft still follows its schedule. For a rate limit it is the smallest one.
     pub fn most(&self) -> f64 {
         let largest = self.clear[0].abs().max(self.clear[1].abs());
         match self.id {
@@ -234,11 +234,11 @@ pub struct Missing {
     pub id: &'static str,
     /// Amplitude in the unit of [`MissingKind::unit`].
     pub amplitude: f64,
-    /// The effect that is added to the JSBSim aircraft; `None` if the aircraft's own file has the effect.
+    /// The effect that is added to the aircraft in JSBSim; `None` if the aircraft's own file has the effect.
     pub hidden: Option<Hidden>,
     /// Id of the effect that is removed from the model; `None` if no effect is removed.
     pub taken_out: Option<&'static str>,
-    /// True values of the coefficients of the catalogue's effect; empty if this effect only approximates the true one.
+    /// True values of the coefficients of the effect in the catalogue; empty if that effect only approximates the true one.
     pub values: Vec<f64>,
 }
 
@@ -250,7 +250,7 @@ pub enum MissingError {
     Unknown {
         /// Id that was requested.
         id: String,
-        /// Ids that exist.
+        /// Ids of the effects that can be hidden.
         known: String,
     },
     /// JSBSim cannot express the formula of an effect file.
@@ -267,7 +267,7 @@ pub enum MissingError {
 }
 
 impl Missing {
-    /// The effect `id` with a total `amplitude`, which includes the same effect of the aircraft `craft` itself.
+    /// The effect `id` with the total `amplitude`: what the aircraft `craft` already has of this effect, plus what is added.
     ///
     /// # Errors
     ///
@@ -279,7 +279,7 @@ impl Missing {
         })?;
         let [own_beta, own_beta2, own_elevator] = craft.own;
         let a = kind.allowed(amplitude);
-        // the aircraft's own effect is removed from the model, and is part of the amplitude
+        // if the aircraft has the effect itself, it is removed from the model and counts in the amplitude
         let (own, taken_out) = match kind.id {
             "drag_beta2" => (own_beta2, Some("drag_beta2")),
             "drag_elevator_abs" => (own_elevator, Some("drag_elevator_abs")),
@@ -304,7 +304,7 @@ impl Missing {
         Ok(Missing { id: kind.id, amplitude: a, hidden, taken_out, values })
     }
 
-    /// An effect of a file, with `values` of its coefficients.
+    /// The effect of an effect file, with the coefficients `values`.
     ///
     /// # Errors
     ///
@@ -321,7 +321,7 @@ impl Missing {
         })
     }
 
-    /// Draws an effect of `craft` from `seed`, unless `id` names one. `amplitude` replaces the drawn amplitude.
+    /// An effect with a clear amplitude, both drawn from `seed`. `id` and `amplitude` replace the drawn ones if they are given.
     ///
     /// # Errors
     ///
@@ -367,7 +367,7 @@ mod tests {
                 assert!(missing.hidden.is_some() && missing.amplitude != 0.0, "{missing:?}");
             }
         }
-        // the aircraft's own 0.1478 is part of the total
+        // the aircraft itself has 0.1478, so 0.3522 are added for a total of 0.5
         let side = Missing::new(&x8, "drag_beta2", 0.5).unwrap();
         assert!((side.hidden.unwrap().amplitude() - 0.3522).abs() < 1e-12);
         assert_eq!(Missing::new(&x8, "time_delay", 0.0234).unwrap().amplitude, 0.02);

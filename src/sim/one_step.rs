@@ -1,4 +1,4 @@
-//! One-step prediction errors of a model over a flight with all controls excited.
+//! One-step prediction errors of a model over a simulated flight in which all controls are excited.
 
 use super::{Environment, Trouble};
 use greylag_control::{ControllerKind, Observation, SetupError, Target, build};
@@ -8,7 +8,7 @@ use greylag_physics::Command;
 /// Angular frequencies of the sines on aileron, elevator, throttle and rudder, rad per step.
 const WAVES: [f64; 4] = [0.11, 0.13, 0.05, 0.07];
 
-/// A flight in which the model's LQI holds attitudes, while a sine is added to each command.
+/// A flight in which an LQI designed from the model holds attitudes. A sine is added to each of its commands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flight {
     /// Length in steps of 0.01 s.
@@ -19,7 +19,7 @@ pub struct Flight {
     pub amplitude: Command,
 }
 
-/// One-step prediction errors of a flight.
+/// One-step prediction errors of the model in a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
     /// RMS error of the predicted state changes over the flight, divided by the step and by the state's scale x_c, 1/s. The
@@ -30,14 +30,14 @@ pub struct Errors {
 }
 
 impl Errors {
-    /// The largest of [`Errors::rms`] and its index in the state.
+    /// The index and the value of the largest of [`Errors::rms`].
     pub fn worst(&self) -> (usize, f64) {
         let largest = self.rms.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
         largest.unwrap_or_default()
     }
 }
 
-/// The flight failed.
+/// Reason why the flight failed.
 #[derive(Debug, thiserror::Error)]
 pub enum FlightError {
     /// No LQI can be designed from the model.
@@ -48,8 +48,8 @@ pub enum FlightError {
     Trouble(#[from] Trouble),
 }
 
-/// Flies `flight` in `environment` towards the `target` of each step. `model` predicts each step from the state and the
-/// actuator positions before the step.
+/// Flies `flight` in `environment` towards the `target` of each step. For each step, `model` predicts the state after the step
+/// from the state and the actuator positions before it.
 ///
 /// # Errors
 ///

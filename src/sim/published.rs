@@ -1,16 +1,18 @@
-//! Published results of the controllers of \[GSFM26\], for comparison with evaluations.
+//! Published results of the controllers of \[GSFM26\] (T. Guerin et al., 2026), for comparison with evaluations.
+//!
+//! The settled error is the mean of the roll and pitch RMSE over the last fifth of a flight to a target.
 
 /// A published value with its 95 % confidence interval, in degrees or in percent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Value {
-    /// The published value.
+    /// The value as the paper states it.
     pub value: f64,
     /// Lower and upper bound of the interval.
     pub ci95: [f64; 2],
 }
 
-/// Results of one controller on one group of targets, from three tables of \[GSFM26\]: XI (true frozen prior, ten
-/// policies), VIII (six models, sixty policies) and V.
+/// Results of one controller on one group of targets, from three tables of \[GSFM26\]: XI ("true frozen prior", ten policies),
+/// VIII (six models, sixty policies) and V.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Published {
     /// Name of the controller in this program.
@@ -29,7 +31,7 @@ pub struct Published {
     pub ms_per_step: f64,
 }
 
-/// The published results of a controller on a group of targets.
+/// The published results of `controller` on the group `targets`. `None` if the paper has none.
 pub fn published(controller: &str, targets: &str) -> Option<&'static Published> {
     ALL.iter().find(|p| p.controller == controller && p.targets == targets)
 }

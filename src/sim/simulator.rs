@@ -1,4 +1,4 @@
-//! JSBSim as an [`Environment`].
+//! JSBSim as an [`Environment`], in which controllers fly episodes.
 
 use greylag_sitl::plant::{Inputs, Plant, PlantOptions, Start, Truth};
 
@@ -15,7 +15,7 @@ pub struct Simulator {
 }
 
 impl Simulator {
-    /// Loads an aircraft.
+    /// Loads an aircraft into JSBSim.
     ///
     /// # Errors
     ///

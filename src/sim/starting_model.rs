@@ -1,4 +1,5 @@
-//! Writes the initial model of a search for missing effects. Its coefficients have errors, and some effects are removed.
+//! Writes the model that is given to a search for missing effects. It is made from a reference model: its coefficients have
+//! random errors, and some effects are removed. An effect is one physical contribution to the forces and moments.
 
 use std::fmt::Write;
 
@@ -9,18 +10,19 @@ use greylag_num::stream::stream;
 use greylag_physics::catalogue::describe;
 use greylag_physics::size::Size;
 
-/// Standard deviation of the coefficient errors, as a fraction of the value. Errors are limited to two standard
+/// Standard deviation of the coefficients' errors, as a fraction of the value. Errors are limited to two standard
 /// deviations.
 pub const WRONG: f64 = 0.15;
-/// Id of the random stream of the errors.
+/// Number that separates the random stream of these errors from others with the same seed.
 const DRAW: u64 = 81;
-/// Range of the angle of attack in which a line approximates the lift table, rad: −4° to 7°, between negative and positive
-/// stall.
+/// Ends of the range of the angle of attack in which a line replaces the lift table, rad: −4° and 7°, between negative and
+/// positive stall.
 const LINE: [f64; 2] = [-0.069_813_2, 0.122_173];
 
-/// Writes the text of a model file named `name` from the text of the model file `reference`. The effects that `missing`
-/// takes out of the model are removed. Every coefficient has an error with the standard deviation [`WRONG`], drawn from
-/// `seed`.
+/// Returns the text of a model file with the model name `name`, made from the text `reference` of a model file. The effects
+/// that `missing` takes out are removed. In place of a lift table, the linear lift coefficients are set. In place of a
+/// propeller or a thrust table, a thrust independent of airspeed is inserted. Every coefficient gets an error with the standard
+/// deviation [`WRONG`], drawn from `seed`.
 ///
 /// # Errors
 ///
@@ -57,7 +59,8 @@ pub fn starting_model(
     Ok(text(&file))
 }
 
-/// Intercept and slope (1/rad) of the line through the two values of an effect `lift_table` at the ends of [`LINE`].
+/// Intercept and slope (1/rad) of a line that replaces the table of an effect `lift_table`. The line passes through the table's
+/// values at the ends of [`LINE`].
 fn line(effect: &toml::Value) -> Option<[f64; 2]> {
     let table = effect.get("CL")?;
     let list = |key: &str| -> Option<Vec<f64>> {
@@ -86,7 +89,7 @@ fn most_in_table(effect: &toml::Value) -> Option<f64> {
     effect.get("T_n")?.get("value")?.as_array()?.last()?.as_array()?.first()?.as_float()
 }
 
-/// The effect `thrust_linear` with half of the static thrust `most` (N), without airspeed dependence.
+/// An effect `thrust_linear` whose thrust at full throttle is half of the static thrust `most` (N).
 fn linear_thrust(most: f64) -> toml::Value {
     let number =
         [("value", rounded(0.5 * most).into()), ("source", "half the thrust at rest".into())];
@@ -100,21 +103,20 @@ fn set(effect: &mut toml::Table, name: &str, value: f64) -> Option<()> {
     Some(())
 }
 
-/// Multiplies every coefficient by 1 + 0.15 x, where x is normally distributed and limited to ±2. The draws are keyed
-/// by the coefficients' names. Therefore the removal of a coefficient does not change the other draws.
+/// Multiplies every coefficient by 1 + 0.15 x, where x is normally distributed and limited to ±2. Each coefficient has its own
+/// random stream, which depends on its name. The removal of an effect therefore does not change the other errors.
 fn make_wrong(effects: &mut toml::Table, seed: u64) {
     for (id, effect) in effects.iter_mut() {
         let Some(effect) = effect.as_table_mut() else { continue };
         for (name, entry) in effect.iter_mut() {
             let Some(number) = entry.as_table_mut() else { continue };
-            // tables over α are not coefficients
+            // entries without a single value, such as tables over α, are not coefficients
             let Some(value) = number.get("value").and_then(toml::Value::as_float) else { continue };
             let path: Vec<u64> = format!("{id}.{name}").bytes().map(u64::from).collect();
             let mut random = stream(seed, &[[DRAW].as_slice(), &path].concat());
             let unit: f64 = StandardNormal.sample(&mut random);
             let wrong = possible(id, name, value * (1.0 + WRONG * unit.clamp(-2.0, 2.0)));
-            // A prior standard deviation below the error would keep the fit at the wrong value. Without `sd` the prior
-            // standard deviation is 15 %.
+            // a smaller prior standard deviation `sd` would hold a fit near the wrong value; without `sd` it is 15 %
             if number
                 .get("sd")
                 .and_then(toml::Value::as_float)
@@ -128,7 +130,7 @@ fn make_wrong(effects: &mut toml::Table, seed: u64) {
     }
 }
 
-/// `value` clamped to the bounds of the coefficient, unless the bounds scale with the aircraft's size.
+/// `value` limited to the catalogue's bounds of the coefficient, unless these bounds scale with the aircraft's size.
 fn possible(effect: &str, name: &str, value: f64) -> f64 {
     let about = describe(effect);
     let own = about.and_then(|about| about.coefficients.iter().find(|c| c.name == name));
@@ -138,14 +140,14 @@ fn possible(effect: &str, name: &str, value: f64) -> f64 {
     }
 }
 
-/// Text of a model file with sections in the order of the shipped files and one line for each number.
+/// `file` as the text of a model file, with one line for each number.
 fn text(file: &toml::Table) -> String {
     let mut out = String::new();
     let is_section = |value: &toml::Value| {
         value.as_table().is_some_and(|t| t.values().any(|v| v.is_table() || v.is_array()))
     };
     let mut sections = vec![(String::new(), file)];
-    // sections are taken from the end of the stack
+    // `sections` is a stack: the sections below a section are pushed in reverse order, so that the first is written next
     while let Some((path, table)) = sections.pop() {
         let (below, here): (Vec<_>, Vec<_>) = table.iter().partition(|(_, v)| is_section(v));
         if !path.is_empty() && !here.is_empty() {
@@ -162,8 +164,8 @@ fn text(file: &toml::Table) -> String {
     out
 }
 
-/// A key as in a TOML file. A key with characters other than letters, digits, `_` and `-` is quoted, for example the name of a
-/// log.
+/// `name` as a key in a TOML file. It is quoted if it has characters other than letters, digits, `_` and `-`, for example if it
+/// is the name of a log.
 fn key(name: &str) -> String {
     let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     match !name.is_empty() && name.chars().all(bare) {

@@ -1,4 +1,4 @@
-//! Evaluation courses: steps between random attitudes in flight.
+//! Courses on which controllers are evaluated: steps from one random attitude to another.
 
 use rand::RngExt;
 

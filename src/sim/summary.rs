@@ -1,5 +1,5 @@
-//! Summary of quality measures over many flights by their median, its confidence interval and the worst value. Decimation of
-//! long series.
+//! Summary of quality measures (such as the overshoot) over many flights: median, its confidence interval and the worst value.
+//! Also a series of numbers that thins itself out when it becomes long.
 
 use std::collections::BTreeMap;
 
@@ -9,24 +9,24 @@ use greylag_control::quality::{MEASURES, Quality};
 use greylag_num::bootstrap;
 use greylag_num::statistics::quantile;
 
-/// Seed of the bootstrap: the same flights give the same intervals.
+/// Seed of the bootstrap. It is fixed, so that the same flights give the same intervals.
 const SEED: u64 = 96;
 
-/// Summary of one measure.
+/// Summary of one quality measure over the flights.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
     /// Median over the flights.
     pub median: f64,
-    /// 95 % bootstrap interval of the median over the flights.
+    /// 95 % bootstrap interval of the median.
     pub median_ci95: [f64; 2],
-    /// The worst value over the flights: smallest or largest, as the measure defines.
+    /// The worst value over the flights. The measure defines whether this is the smallest or the largest.
     pub worst: f64,
 }
 
 /// Summaries by the id of the measure.
 pub type Spreads = BTreeMap<&'static str, Spread>;
 
-/// Summary of every measure over `flights`, from its finite values. Measures without a finite value are omitted.
+/// Summary of every measure over `flights`. Only finite values count. Measures without any finite value are omitted.
 pub fn spreads(flights: &[&Quality]) -> Spreads {
     let of = |measure: &greylag_control::quality::Measure| {
         let values = flights.iter().map(|q| (measure.get)(q));
@@ -44,8 +44,8 @@ pub fn spreads(flights: &[&Quality]) -> Spreads {
 /// Largest number of values in a [`Thinned`] series.
 const MOST: usize = 4_000_000;
 
-/// A series with at most 4 million values in memory. Of a longer series only every second value is kept, or every fourth, and
-/// so on.
+/// A series of which at most 4 million values are kept. When it becomes longer, only every second value is kept, then every
+/// fourth, and so on.
 #[derive(Clone, Debug)]
 pub struct Thinned {
     kept: Vec<f64>,
@@ -77,7 +77,7 @@ impl Thinned {
         }
     }
 
-    /// The values that are held, in order.
+    /// The values that are kept, in order.
     pub fn values(&self) -> &[f64] {
         &self.kept
     }

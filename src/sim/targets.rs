@@ -1,4 +1,5 @@
-//! Target attitudes: the seeded target file for scoring controllers, and the target sequence for training.
+//! Target attitudes: target files, on which controllers are scored, and the target sequence of a policy training. \[GSFM26\]
+//! is the paper by T. Guerin et al., 2026, see `src/lib.rs`.
 
 use std::path::Path;
 
@@ -27,7 +28,7 @@ pub enum Group {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
-    /// Index of the target in the file, from 0. The index selects the random stream.
+    /// Index of the target in the file, from 0. It selects the random stream of the flight to the target.
     #[serde(skip)]
     pub number: u32,
     /// Group of the target.
@@ -44,9 +45,9 @@ const BINS: usize = 5;
 /// Id of the random stream of [`Stratified`].
 const STRATIFIED: u64 = 241;
 
-/// An infinite sequence of targets, stratified over 5 × 5 bins of the envelope of Table II.
+/// An infinite sequence of targets within |roll| ≤ 60° and |pitch| ≤ 30°, stratified over 5 × 5 bins.
 ///
-/// Seed and number of targets define the state of the sequence. A checkpoint can therefore resume it.
+/// The seed and the number of targets drawn so far determine all further targets. A checkpoint can therefore resume it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stratified {
     seed: u64,
@@ -57,21 +58,21 @@ pub struct Stratified {
     bins: Vec<usize>,
 }
 
-/// Fraction of targets at the reference airspeed if other airspeeds are allowed.
+/// Probability of a target at the reference airspeed if other airspeeds are allowed.
 const SLOW: f64 = 0.5;
-/// First the ratio of the smallest commanded airspeed to the envelope's smallest airspeed. Then the ratio of the largest
-/// commanded airspeed to the cruise airspeed.
+/// Range of the other airspeeds. The smallest is the first number times the envelope's smallest airspeed. The largest is the
+/// second number times the cruise airspeed.
 const WANTED: [f64; 2] = [1.15, 1.25];
 
 impl Stratified {
-    /// The target sequence of `seed`, which starts after its first `count` targets. A fraction `corners` (0..1) of the
-    /// targets is drawn in the hard corners, which cover 4 % of the envelope. The paper uses 0.
+    /// The target sequence of `seed` after its first `count` targets. `corners` (0..1) is the probability that a target is drawn
+    /// in the hard corners, which cover 4 % of the whole range. The paper uses 0.
     pub fn new(seed: u64, count: u64, corners: f64) -> Stratified {
         let start = State::NEUTRAL.airspeed;
         Stratified { seed, count, corners, start, airspeeds: [start; 2], bins: Vec::new() }
     }
 
-    /// The same attitudes, half of them at the reference airspeed of `airframe` and half at other airspeeds of its
+    /// The same attitudes, about half of them at the reference airspeed of `airframe` and half at other airspeeds of its
     /// envelope.
     pub fn at_airspeeds_of(self, airframe: &Airframe) -> Stratified {
         let ([low, high], envelope) = (WANTED, &airframe.envelope);
@@ -79,7 +80,7 @@ impl Stratified {
         Stratified { start: airframe.reference.airspeed, airspeeds, ..self }
     }
 
-    /// Continues the sequence after its first `count` targets.
+    /// Moves to the position after the first `count` targets of the sequence.
     pub fn go_on_after(&mut self, count: u64) {
         (self.count, self.bins) = (count, Vec::new());
     }
@@ -111,7 +112,7 @@ impl Stratified {
         Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed }
     }
 
-    /// The airspeed of the target with that number, m/s.
+    /// The airspeed of the target with the index `number`, m/s.
     fn airspeed(&self, number: u64) -> f64 {
         let [low, high] = self.airspeeds;
         let mut rng = stream::stream(self.seed, &[STRATIFIED, 2, number]);
@@ -122,8 +123,8 @@ impl Stratified {
     }
 }
 
-/// A target file. The generated one has 140 easy targets, 100 in the hard corners, and 100 anywhere outside the box of the
-/// easy targets.
+/// A target file. [`TargetFile::generate`] makes 140 easy targets, 100 in the hard corners, and 100 anywhere outside the box
+/// of the easy targets.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TargetFile {
     /// The targets in file order.
@@ -176,7 +177,7 @@ impl Group {
 }
 
 impl TargetFile {
-    /// The target set of `seed`, rounded to 0.01°. The easy targets are stratified in a 14 × 10 grid of roll and pitch.
+    /// The targets of `seed`, rounded to 0.01°. The easy targets are stratified in a 14 × 10 grid of roll and pitch.
     pub fn generate(seed: u64) -> TargetFile {
         let mut rng = stream::stream(seed, &[240]);
         let mut rows = Vec::new();

@@ -1,4 +1,4 @@
-//! Single flights for display: attitude over time, and a planner's candidates at chosen times.
+//! Single flights for display: attitude over time, and a planner's candidate plans at chosen times.
 
 use crate::{Environment, Trouble};
 use greylag_control::insight::Insight;
@@ -17,11 +17,11 @@ pub struct Tracking {
     pub insights: Vec<(usize, Insight)>,
 }
 
-/// Flies towards `target` for `steps` steps of 10 ms.
+/// Flies towards `target` for `steps` steps of 10 ms. The flight ends early if the aircraft is lost.
 ///
 /// # Errors
 ///
-/// If the environment cannot be reset. Losing the aircraft ends the flight.
+/// If the environment cannot be reset.
 pub fn track(
     environment: &mut dyn Environment,
     controller: &mut dyn Controller,

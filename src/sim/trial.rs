@@ -1,4 +1,6 @@
-//! A test case of the diagnosis: flights of an aircraft with an effect that its model lacks.
+//! A test case (trial) of the diagnosis: flights of an aircraft with an effect that its model lacks.
+//!
+//! A schedule is a sequence of targets and excitations that a controller flies. It has bounds that the aircraft must not leave.
 
 use std::f64::consts::TAU;
 
@@ -20,7 +22,8 @@ use greylag_physics::airframe::Reference;
 
 /// Id of the random stream of the wind.
 const WIND: u64 = 82;
-/// Largest steady wind for an aircraft that cruises at `CRUISE_MPS`, m/s. It is scaled in proportion to the cruise airspeed.
+/// Largest steady wind for an aircraft that cruises at `CRUISE_MPS`, m/s. For other aircraft it is proportional to the cruise
+/// airspeed.
 const WIND_MAX_MPS: f64 = 6.0;
 /// Wind speed at 20 ft above ground in light turbulence, m/s (MIL-F-8785C).
 const LIGHT_20FT_MPS: f64 = 7.6;
@@ -29,16 +32,16 @@ const LIGHT_20FT_MPS: f64 = 7.6;
 #[derive(Clone, Debug)]
 pub struct Subject {
     /// The simulated aircraft: its initial state, and the JSBSim properties that are held constant. The test case adds wind,
-    /// turbulence and hidden effects.
+    /// turbulence and the effects that the model lacks.
     pub plant: PlantOptions,
     /// Cruise airspeed, m/s.
     pub cruise: f64,
-    /// Whether the rudder is excited.
+    /// Whether the rudder is excited too.
     pub rudder: bool,
 }
 
 impl Subject {
-    /// The aircraft of `plant` as described by `airframe`, starting at its reference airspeed.
+    /// The aircraft of `plant` as described by `airframe`. It starts at the reference airspeed and altitude of `airframe`.
     ///
     /// # Errors
     ///
@@ -54,7 +57,7 @@ impl Subject {
         })
     }
 
-    /// The schedule scaled to this aircraft.
+    /// The schedule scaled to the cruise airspeed of this aircraft, with rudder excitation if it has a rudder.
     fn scaled(&self, schedule: &Schedule, seed: u64) -> Schedule {
         let schedule = schedule.clone().at_cruise(self.cruise);
         if self.rudder { schedule.with_rudder(seed) } else { schedule }
@@ -75,15 +78,15 @@ pub struct Trial {
     pub subject: Subject,
     /// Seed of schedules, wind, instruments and noise.
     pub seed: u64,
-    /// The effects that the aircraft has and its model lacks; empty for a null case.
+    /// The effects that the aircraft has and its model lacks; empty for a case without a missing effect.
     pub missing: Vec<Missing>,
-    /// Severity of the turbulence, 1 to 7; `None` for no turbulence.
+    /// Severity of the turbulence: a probability-of-exceedance curve of MIL-F-8785C, 1 to 7. `None` for no turbulence.
     pub turbulence: Option<u8>,
     /// Installation errors of the instruments, the same in all flights.
     pub installed: Installation,
 }
 
-/// Logs of a test case.
+/// Logs of the flights of a test case.
 #[derive(Clone, Debug)]
 pub struct Logs {
     /// Flights for parameter estimation.
@@ -93,12 +96,12 @@ pub struct Logs {
 }
 
 impl Trial {
-    /// Flies the training and the test flights of the seed with `controller`. The excitation is reduced if the aircraft
-    /// would leave the bounds of a schedule. Sensor errors are drawn anew for each flight.
+    /// Flies the training and the test flights of the seed with `controller`. A flight that leaves the bounds of its schedule
+    /// is repeated with less excitation. Sensor errors are drawn anew for each flight.
     ///
     /// # Errors
     ///
-    /// If the aircraft cannot be built, or leaves the bounds of a schedule even with the smallest excitation.
+    /// If the aircraft cannot be simulated, or leaves the bounds of a schedule even with the smallest excitation.
     pub fn fly(&self, controller: &dyn Controller) -> Result<Logs, FlightTestError> {
         let training = self.training(controller)?;
         let testing = flights::testing(self.seed);
@@ -133,7 +136,7 @@ impl Trial {
         Ok(log)
     }
 
-    /// The aircraft with the wind and the turbulence of the `k`-th flight.
+    /// The simulated aircraft with the missing effects, and with the wind and the turbulence of the `k`-th flight.
     fn plant(&self, k: usize) -> PlantOptions {
         let mut random = stream(self.seed, &[WIND, k as u64]);
         let calm = self.subject.cruise / CRUISE_MPS;

@@ -4,11 +4,12 @@ use crate::Trouble;
 use crate::imagined::{Block, Imagination, Stepped};
 use greylag_control::policy::{ACTIONS, OBSERVATIONS};
 
-/// One or several aircraft, each in its own episode. A new episode follows one that ends.
+/// One or several aircraft, each in its own episode, which is a flight towards one target. When an episode ends, the aircraft
+/// starts a new one.
 pub trait World {
-    /// Number of aircraft.
+    /// Number of aircraft in the environment.
     fn instances(&self) -> usize;
-    /// Observations of a block's aircraft. If the last block has more lanes than aircraft, the remaining lanes are unused.
+    /// Observations of the aircraft of a block. If the last block has more lanes than aircraft, its remaining lanes are unused.
     fn observe(&self, block: usize) -> [Block; OBSERVATIONS];
     /// Simulates the aircraft of a block for one time step.
     ///
@@ -16,8 +17,8 @@ pub trait World {
     ///
     /// If the environment cannot continue. The loss of an aircraft is not an error.
     fn step(&mut self, block: usize, action: &[Block; ACTIONS]) -> Result<Stepped, Trouble>;
-    /// Starts new episodes. Their targets follow the first `targets` ones of the random sequence. Training that is resumed
-    /// thus continues the sequence.
+    /// Starts new episodes. Their targets are taken from the random sequence of targets after its first `targets` members. A
+    /// training that is resumed can therefore continue the sequence.
     ///
     /// # Errors
     ///

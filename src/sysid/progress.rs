@@ -1,4 +1,4 @@
-//! Progress reports of a long task to a listener, which can cancel the task.
+//! Progress reports of a long task to a listener. The listener can cancel the task.
 
 use std::ops::ControlFlow;
 
@@ -7,10 +7,9 @@ use std::ops::ControlFlow;
 pub struct Stage<'a> {
     /// Current activity, in words for the user.
     pub doing: &'a str,
-    /// Estimated share of the whole task that is done, 0 to 1. It may fall, for example when a search removes an
-    /// effect.
+    /// Estimated share of the whole task that is done, 0 to 1. It may fall, for example when a search repeats a step.
     pub fraction: f64,
-    /// Candidate effects of a diagnosis, best first. Filled only in the stage after the first ranking; else empty.
+    /// Candidate effects of a diagnosis, best first. It is empty in all stages but that after the first ranking.
     pub ranking: &'a [FirstLook],
 }
 
@@ -29,8 +28,8 @@ pub struct FirstLook {
     /// Evidence for the effect, dimensionless: the smaller of the penalised likelihood gain (as in the BIC) and the
     /// Wald statistic.
     pub evidence: f64,
-    /// Critical value of the evidence, dimensionless. The best candidate exceeds it by chance, with the probability of
-    /// the significance level, if no effect is missing.
+    /// Critical value of the evidence, dimensionless. If no effect is missing, the best candidate exceeds it with the
+    /// probability of the significance level.
     pub threshold: f64,
 }
 

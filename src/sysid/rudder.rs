@@ -12,8 +12,8 @@ pub const CHANNELS: [ChannelId; 4] =
 
 /// Returns the largest rudder motion in `flights`; `None` if no rudder moves or `model` has a rudder effect.
 ///
-/// A rudder command does not count if the airframe states that the aircraft has no rudder, because firmware sends
-/// rudder commands nevertheless.
+/// A rudder command does not count if the airframe states that the aircraft has no rudder, because firmware sends rudder
+/// commands even then.
 pub fn unmodelled(flights: &[Reconstruction], model: &GreyBox) -> Option<RudderMotion> {
     if model.has(RUDDER) {
         return None;
@@ -37,7 +37,7 @@ pub fn warning(motion: RudderMotion) -> String {
     )
 }
 
-/// Reason, in words, not to assert an effect in `CHANNELS`: a rudder moves by `motion`, and the model has no rudder
+/// Text that states why no effect is asserted in [`CHANNELS`]: a rudder moves by `motion`, and the model has no rudder
 /// effect.
 pub fn reason(motion: RudderMotion) -> String {
     let motion = motion.to_string();

@@ -1,5 +1,6 @@
-//! Separation of two candidate effects: how well a flight distinguishes them after the model's coefficients are
-//! refitted.
+//! Separation of two candidate effects: how well a flight distinguishes them after the model's coefficients are refitted.
+//!
+//! A channel is a force or a moment. A window is a short section of the flight over which the channels are averaged.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -12,17 +13,17 @@ const CHANNELS: usize = 6;
 /// Ridge parameter of a regressor without a prior, relative to the regressor's squared norm. The normal equations then
 /// have a solution even if two regressors are equal.
 const RIDGE: f64 = 1e-9;
-/// Prior standard deviation of a channel's constant error, in standard deviations of the noise of one window.
+/// Prior standard deviation of a constant error of a channel, in standard deviations of the noise of one window.
 const BIAS_WIDTH: f64 = 100.0;
 
-/// Squared difference between the predictions with and without an effect, summed over all windows and channels, in
-/// variances of the noise. The evidence of a diagnosis has the same unit.
+/// Squared difference between the predictions with and without an effect, summed over all windows and channels, in variances of
+/// the noise. The evidence (test statistic) of a diagnosis has the same unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Separation {
     /// Difference that remains after the model's coefficients are refitted. It measures how detectable the effect is.
     pub visible: f64,
-    /// Difference that remains after the other effect is fitted as well. It measures how well the two effects are
-    /// distinguished.
+    /// Difference that remains after the other effect is fitted as well. It measures how well the flight distinguishes the two
+    /// effects.
     pub apart: f64,
 }
 
@@ -51,8 +52,8 @@ pub fn separation(
     Separation { visible, apart: apart.min(visible) }
 }
 
-/// Standard deviation of each channel's noise in one window, in the channel's unit. It is infinite for a channel that
-/// is not measured or whose noise is not known; such a channel has no weight.
+/// Standard deviation of each channel's noise in one window, in the channel's unit. It is infinite if the channel is not
+/// measured or its noise is unknown. The channel then has no weight.
 fn noise(model: &GreyBox, flight: &Prepared) -> [f64; CHANNELS] {
     let mut scale = [f64::INFINITY; CHANNELS];
     for series in channels(model, flight) {
@@ -64,8 +65,8 @@ fn noise(model: &GreyBox, flight: &Prepared) -> [f64; CHANNELS] {
     scale
 }
 
-/// Measured minus predicted values, in standard deviations of the noise. All windows of the first channel come first,
-/// then those of the next channel. Values that are not measured are 0.
+/// Residuals (measured minus predicted values) in standard deviations of the noise. All windows of the first channel come
+/// first, then those of the next channel. The residual of a missing measurement is 0.
 fn residual(model: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> DVector<f64> {
     let windows = flight.windows.len();
     let mut all = DVector::zeros(CHANNELS * windows);
@@ -82,7 +83,7 @@ fn residual(model: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> DVec
     all
 }
 
-/// Regressors of all refitted parameters. Each is multiplied by the prior standard deviation of its parameter.
+/// Regressors of all parameters that are refitted, each multiplied by the prior standard deviation of its parameter.
 fn refitted(base: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> Vec<DVector<f64>> {
     let windows = flight.windows.len();
     let found = columns(base, flight);
@@ -102,9 +103,9 @@ fn refitted(base: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> Vec<D
     all
 }
 
-/// Fits the regressors `prior` and `free` to `gap` by least squares. Returns the squared norm of the residual plus the
-/// sum of the squared coefficients of `prior`, whose prior has zero mean and unit variance. Zero if the normal
-/// equations cannot be solved.
+/// Fits the regressors `prior` and `free` to `gap` by least squares. The coefficients of `prior` have a prior with zero mean
+/// and unit variance. Returns the squared norm of the residual plus the sum of the squared coefficients of `prior`. Zero if the
+/// normal equations cannot be solved.
 fn remaining(prior: &[DVector<f64>], free: Vec<DVector<f64>>, gap: &DVector<f64>) -> f64 {
     let free = free.into_iter().filter(|column| column.norm_squared() > 0.0);
     let columns: Vec<DVector<f64>> = prior.iter().cloned().chain(free).collect();
@@ -131,7 +132,8 @@ mod tests {
         let gap = DVector::from_vec(vec![3.0, 4.0, 12.0]);
         assert!((remaining(&[], Vec::new(), &gap) - 169.0).abs() < 1e-9);
         assert!((remaining(&[], vec![unit(2)], &gap) - 25.0).abs() < 1e-6);
-        // a regressor of norm 3 with a prior: 3² − (3·3)²/(3² + 1) = 0.9 remains of the squared first entry, 3² = 9
+        // With a regressor of norm 3 and its prior, 3² − (3·3)²/(3² + 1) = 0.9 remains of 3² = 9, the squared first entry. The
+        // second entry adds 4² = 16.
         assert!((remaining(&[unit(0) * 3.0], vec![unit(2)], &gap) - 16.9).abs() < 1e-6);
         // the same regressor twice gives the same result
         assert!((remaining(&[], vec![unit(2), unit(2)], &gap) - 25.0).abs() < 1e-6);

@@ -1,5 +1,5 @@
-//! Signature of an effect: its changes of forces and moments over one variable at a time, and its changes of the
-//! aircraft's response to a manoeuvre.
+//! Signature of an effect: curves that show how the effect changes forces and moments over one variable at a time (a sweep), and
+//! how it changes the response of the aircraft to a manoeuvre.
 
 use greylag_model::{GreyBox, JoinError, STEP, Trim, TrimError, Twin};
 use greylag_physics::effects::Description;
@@ -12,16 +12,16 @@ const ALTITUDE: f64 = 600.0;
 /// Largest number of sweeps in a signature. The sweeps with the largest changes are selected.
 const SWEEPS: usize = 4;
 
-/// Largest number of states in the manoeuvre. The states with the largest changes are selected.
+/// Largest number of states that are shown for the manoeuvre. The states with the largest changes are selected.
 const STATES: usize = 4;
 
 /// Number of points of a sweep.
 const POINTS: usize = 121;
 
-/// A change is negligible below this fraction of the range that the quantity has without the effect.
+/// Largest negligible change, as a fraction of the range that the quantity has without the effect.
 const NOTHING: f64 = 1e-4;
 
-/// Error of computing a signature.
+/// Reason why a signature cannot be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum SignatureError {
     /// The effect cannot be added to the model.
@@ -119,7 +119,7 @@ const VARIABLES: [Variable; 12] = [
 /// comparison is with zero coefficients.
 ///
 /// # Errors
-/// The effect is a measurement error or cannot be added to the model, or the model has no level trim at the airframe's
+/// If the effect is a measurement error or cannot be added to the model, or if the model has no level trim at the airframe's
 /// cruise airspeed.
 pub fn signature(
     model: &GreyBox,
@@ -148,7 +148,8 @@ fn set(model: &mut GreyBox, about: &Description, values: &[f64]) {
 }
 
 fn sweeps(models: &[GreyBox; 2], trim: &Trim) -> Vec<Pair> {
-    // sideslip (rad), rates (rad/s) and aileron (rad) differ from zero, where effects of their products would vanish
+    // sideslip (rad), rates (rad/s) and aileron (rad) are not zero, because effects that depend on their products would
+    // otherwise be invisible
     let state = State { beta: 0.07, p: 0.4, q: 0.3, r: 0.3, ..trim.state };
     let controls = Controls { aileron: 0.1, ..trim.controls };
     let from = Condition { state, controls, altitude: ALTITUDE };
@@ -237,7 +238,7 @@ fn plainest(all: Vec<Pair>, most: usize) -> Vec<Pair> {
         let difference: Vec<f64> =
             pair.with.iter().zip(&pair.without).map(|(with, without)| with - without).collect();
         let largest = difference.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
-        // a change that varies along the axis is more informative than a constant one
+        // a change that varies along the axis is more informative than a constant one, so the latter counts a tenth
         (extent(&difference) + 0.1 * largest) / range(pair.y_label)
     };
     let mut ranked: Vec<(f64, &Pair)> =
@@ -252,8 +253,8 @@ mod tests {
     use greylag_physics::{effects, inputs};
     use std::path::Path;
 
-    /// With its example values, every effect of the catalogue changes a sweep and the manoeuvre. An effect of the
-    /// inputs, such as an actuator lag, changes only the manoeuvre.
+    /// Every effect of the catalogue, with its example values, must change at least one sweep and the manoeuvre. An effect
+    /// between actuators and deflections, such as a lag, changes only the manoeuvre.
     #[test]
     fn every_effect_leaves_its_signature() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");

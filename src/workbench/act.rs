@@ -1,4 +1,7 @@
-//! Requests of a page and their execution.
+//! Requests of the workbench's page and their execution.
+//!
+//! A session of the workbench holds flights with roles, a model, and effects that the user has accepted. The amended model is
+//! the fit with these effects.
 
 use std::fs;
 use std::path::PathBuf;
@@ -24,13 +27,13 @@ use greylag_sysid::weak_form::prepared::Prepared;
 /// Subfolder of the session's folder for the saved model.
 pub(super) const SAVED: &str = "model";
 
-/// A request, with the revision of the session on which it is based.
+/// A request with the revision of the session that the page showed.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Request {
-    /// Revision of the session on the page that made the request.
+    /// Revision of the session that the page showed.
     pub revision: u64,
-    /// The request itself.
+    /// The request that the page makes.
     pub act: Act,
 }
 
@@ -50,7 +53,7 @@ pub enum Act {
         /// Index of the flight in the session.
         flight: usize,
     },
-    /// Multiply a column of all logs by a factor, as recommended by a finding.
+    /// Multiply a column of all logs by a factor, as the finding about a flight recommends.
     Map {
         /// Index of the flight with the finding.
         flight: usize,
@@ -61,20 +64,20 @@ pub enum Act {
     },
     /// Start a diagnosis of the model.
     Diagnose,
-    /// Accept an effect and fit the model with it.
+    /// Accept an effect and refit the model with it.
     Tick {
         /// Id of the effect in the catalogue.
         effect: String,
     },
-    /// Keep the last accepted effect although the data refuse it.
+    /// Keep the last accepted effect although the fit refuses it.
     Keep,
     /// Remove the last accepted effect.
     Undo,
     /// Accept again the last removed effect.
     Redo,
-    /// Compute missing fits, for example after the role of a flight has changed.
+    /// Compute fits that are missing, for example after the role of a flight has changed.
     Fit,
-    /// Compare the models with the test flights, which opens them.
+    /// Compare the given and the amended model on the test flights, which are no longer unseen afterwards.
     Judge,
     /// Write the amended model to the subfolder `model` of the session's folder.
     Save,
@@ -85,12 +88,12 @@ pub enum Act {
         /// Id of the job.
         job: u64,
     },
-    /// Add an effect that is written as text to the session.
+    /// Add an effect from the text of an effect file to the session.
     Write {
         /// Text of the effect file.
         text: String,
     },
-    /// Remove an effect that was written as text from the session.
+    /// Remove an effect that was added as text from the session.
     Forget {
         /// Id of the effect.
         effect: String,
@@ -102,9 +105,9 @@ pub enum Act {
         /// Ids of the two effects.
         between: [String; 2],
     },
-    /// Fly the model in the simulator as ordered.
+    /// Fly a simulated aircraft as ordered, with a controller designed from the session's model.
     Fly(Order),
-    /// Display a recording while another program writes it.
+    /// Display a recording that another program is writing.
     Watch {
         /// Folder of the recording, or path of the recorded log.
         folder: PathBuf,
@@ -119,10 +122,10 @@ pub enum Act {
 }
 
 impl Bench {
-    /// Executes the request.
+    /// Executes `request`, which a page has made.
     ///
     /// # Errors
-    /// `WorkbenchError::Conflict` if the session has changed since the page read it; another error if the request cannot be
+    /// `WorkbenchError::Conflict` if the session has changed since the page read it. Another error if the request cannot be
     /// executed.
     pub fn act(self: &Arc<Self>, request: Request) -> Result<(), WorkbenchError> {
         let seen = request.revision;
@@ -184,7 +187,7 @@ impl Bench {
         })
     }
 
-    /// Keeps the last accepted effect although the data refuse it.
+    /// Keeps the last accepted effect although the fit refuses it.
     fn keep(self: &Arc<Self>, seen: u64) -> Result<(), WorkbenchError> {
         self.change(seen, |inner| {
             let last = inner.session.effects.last_mut();
@@ -203,7 +206,8 @@ impl Bench {
             inner.supersede(Work::Fit);
             Ok(())
         })?;
-        // the fit of the remaining effects may be missing: it was interrupted, or a flight has changed its role
+        // The fit with the remaining effects may be missing: it may have been interrupted, or a flight may have changed its
+        // role.
         self.start(Work::Fit);
         Ok(())
     }
@@ -219,7 +223,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Adds a log with the name `name` and the content `bytes`, which a page has sent.
+    /// Adds a log that the page has sent, with the name `name` and the content `bytes`.
     ///
     /// # Errors
     /// If `name` is invalid, `bytes` are not a usable log, the session already contains the log, the session is not at revision
@@ -293,8 +297,8 @@ impl Bench {
         Ok(())
     }
 
-    /// Scores the given and the amended model by free runs over the test flights. The opening of the test flights is recorded
-    /// before the results are displayed.
+    /// Scores the given and the amended model by free runs (open-loop simulations) over the test flights. Records in the
+    /// session that the test flights have been used, before the results are displayed.
     fn judge(&self, seen: u64) -> Result<(), WorkbenchError> {
         self.same_model()?;
         let (given, amended, effects, places, flights) = {
@@ -342,7 +346,7 @@ impl Bench {
 }
 
 impl Inner {
-    /// The amended model, and the accepted effects that its fit added.
+    /// The amended model, and those of the accepted effects that its fit added.
     fn amended(&self) -> Result<(GreyBox, Vec<String>), WorkbenchError> {
         if self.session.effects.is_empty() {
             return Ok((self.model.clone(), Vec::new()));
@@ -353,7 +357,7 @@ impl Inner {
     }
 }
 
-/// The longest horizon, s, that runs reach and that is at most `Options::JUDGED_AT_S`, and the error at this horizon. NaN if no
+/// The longest horizon, s, that is at most `Options::JUDGED_AT_S` and that runs reach, and the error at this horizon. NaN if no
 /// run reaches a horizon.
 fn judged(scores: &[HorizonScore]) -> (f64, f64) {
     let mut reached = scores.iter().filter(|s| s.runs > 0 && s.horizon_s <= Options::JUDGED_AT_S);

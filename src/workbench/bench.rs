@@ -1,4 +1,5 @@
-//! The session in memory, with the results computed from it.
+//! The workbench's session in memory, with the results computed from it. A session is a folder with a model, flight logs and
+//! accepted effects. Pages in the browser show the session and edit it.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -30,8 +31,8 @@ pub struct Given {
     pub folder: PathBuf,
     /// Path of the model file; required for a new session.
     pub model: Option<PathBuf>,
-    /// Logs to add; a log that the session already contains is skipped. A file that is no usable log is added as an unused flight
-    /// with its error.
+    /// Logs to add. A log that the session already contains is skipped. A file that is not a usable log is added as an unused
+    /// flight, with its error.
     pub logs: Vec<PathBuf>,
     /// Options for reading logs.
     pub reading: Reading,
@@ -40,22 +41,24 @@ pub struct Given {
     pub failsafes: super::failsafe::Failsafes,
 }
 
-/// A session with the results computed from it: logs and their roles, the model, accepted effects, jobs, flights.
+/// A session with the results computed from it.
 ///
 /// It is shared as an `Arc`, may be called from any thread and has no network access. Its methods are of four kinds:
 ///
 /// - [`Bench::open`] reads or creates the session of a folder and claims the folder until the value is dropped.
-/// - Requests are [`Bench::act`] and [`Bench::take`] (a log). Each contains the revision on which it is based. If this revision
-///   is outdated, a request that edits the session fails with [`WorkbenchError::Conflict`]. Otherwise the edit is on disk when
-///   the call returns. `Diagnose`, `Fit`, `Propose`, `Design`, `Save`, `Cancel` and `StopFlight` are accepted at any revision.
+/// - Requests are [`Bench::act`] and [`Bench::take`] (which adds a log). Each contains the revision of the session on which it
+///   is based. If this revision is outdated, a request that edits the session fails with [`WorkbenchError::Conflict`]. Otherwise
+///   the edit is on disk when the call returns. `Diagnose`, `Fit`, `Propose`, `Design`, `Save`, `Cancel` and `StopFlight` are
+///   accepted at any revision.
 /// - Views do not change the session: [`Bench::state`], [`Bench::diagnosis`], [`Bench::failing`], [`Bench::flight`],
 ///   [`Bench::free_run`] and others. `failing` and `flight` block while they compute a comparison that is not cached. `flight`
 ///   and `free_run` refuse test flights that have not been opened.
 /// - Events go to the callback of [`Bench::open`], on the thread that causes them. The callback may call the bench.
 ///
-/// After `open`, requests and views may be called in any order. Each job runs on a separate thread. A new job replaces a running
-/// job of the same kind, which ends at its next stage like a cancelled job. Each result is stored under a key of its inputs, so
-/// an undone edit restores it. The system clock is used only for time stamps of records in the session.
+/// After `open`, requests and views may be called in any order. Each job runs on a thread of its own. A new job replaces a
+/// running job of the same kind, which then ends at its next stage, as if it was cancelled. Each result is stored under a key
+/// that is computed from its inputs. If an edit is undone, the earlier result is therefore found again. The system clock is used
+/// only for time stamps in the session.
 pub struct Bench {
     pub(super) folder: PathBuf,
     pub(super) on_event: Box<dyn Fn(Event) + Send + Sync>,
@@ -80,15 +83,15 @@ pub(super) struct Inner {
     pub diagnosis: Option<(String, Arc<Value>)>,
     /// Key and result of the search for a formula.
     pub proposal: Option<(String, Arc<Value>)>,
-    /// The two effects that the next schedule has to distinguish.
+    /// The two effects that the next flight-test schedule is to distinguish.
     pub between: Option<[String; 2]>,
     /// Schedules that were designed in this session.
     pub designed: Vec<Designed>,
-    /// The present flight, or else the last flight.
+    /// The present flight, or the last one if none is in progress.
     pub flying: Option<Flying>,
     pub estimate: Option<(String, Estimate)>,
     pub fits: BTreeMap<String, Arc<Fitted>>,
-    /// Error of the failed job of each key.
+    /// Errors of failed jobs, by the key of the job's result.
     pub failures: BTreeMap<String, String>,
     pub jobs: Vec<Job>,
     pub next_job: u64,
@@ -136,7 +139,7 @@ impl Bench {
         inner.take_mapping()?;
         inner.read_own()?;
         inner.read_designed();
-        // marks flights that an earlier process did not finish
+        // an earlier process may have ended during a flight
         let cut = inner.session.flown.iter_mut().filter(|f| f.outcome == Outcome::Flying);
         cut.for_each(|flown| flown.outcome = Outcome::CutOff);
         inner.reread();
@@ -167,7 +170,8 @@ impl Bench {
         self.lock().session.revision
     }
 
-    /// Applies `edit` if the session is at revision `seen`, and writes the session. If either fails, the state is restored.
+    /// Applies `edit` if the session is at revision `seen`, and writes the session. If the edit or the writing fails, the state
+    /// before is restored.
     pub(super) fn change<T>(
         &self,
         seen: u64,
@@ -211,7 +215,7 @@ impl Bench {
         written
     }
 
-    /// Adds the log at `path` with the content `bytes`. Without a `role`, its role is that of [`Session::usual_role`].
+    /// Adds the log at `path` with the content `bytes`. If `role` is `None`, the log gets the role of [`Session::usual_role`].
     pub(super) fn add(
         &self,
         seen: u64,
@@ -237,12 +241,13 @@ impl Bench {
         })
     }
 
-    /// Comparison of the models (given, tuned, amended) with the fit and hold-out flights; cached by key.
+    /// Compares the given, tuned and amended models, as far as they exist, with the fit and hold-out flights. The result is
+    /// cached by key.
     pub(super) fn comparison(&self) -> Result<(Vec<Way>, Arc<Comparison>), WorkbenchError> {
         let (key, ways, models, flights) = {
             let inner = self.lock();
             let (shown, (ways, models)) = (inner.shown(), inner.ways());
-            // an effect without a fitted or estimated model does not change the comparison
+            // accepted effects do not change the comparison before a model with them is fitted or estimated
             let effects = if shown == "given" { &[] } else { &inner.session.effects[..] };
             let key = format!("{}{shown}{ways:?}", inner.key("comparison", effects));
             if let Some((_, known)) = inner.comparison.as_ref().filter(|(k, _)| *k == key) {
@@ -303,7 +308,7 @@ impl Before {
     }
 }
 
-/// Reads or creates the session and reads its model, which may have changed since the last run.
+/// Reads or creates the session and reads its model. The model file may have changed since the session was last open.
 fn begin(
     folder: &Path,
     model: Option<&Path>,
@@ -345,7 +350,8 @@ fn result_file(folder: &Path, key: &str) -> PathBuf {
 }
 
 impl Inner {
-    /// Loads stored results for the present keys, from an earlier run or from an earlier state of the session.
+    /// Loads stored results that belong to the present state of the session. An earlier run, or the same state before an edit,
+    /// may have computed them.
     pub fn recall(&mut self) {
         let stored = |key: &str, known: &Option<(String, Arc<Value>)>| {
             if known.as_ref().is_some_and(|(of, _)| of == key) {
@@ -370,7 +376,8 @@ impl Inner {
         }
     }
 
-    /// Origin of the displayed amended model: `fitted`, `estimated`, or `given` if there is neither a fit nor an estimate.
+    /// Origin of the amended model that is displayed: `fitted`, `estimated`, or `given` if there is neither a fit nor an
+    /// estimate.
     pub fn shown(&self) -> String {
         let key = self.key("fit", &self.session.effects);
         match (self.fits.contains_key(&key), &self.estimate) {
@@ -380,8 +387,8 @@ impl Inner {
         }
     }
 
-    /// The given model, then the amended model if there is one. Until its fit is complete, the amended model is an equation-error
-    /// estimate.
+    /// The given model, followed by the amended model (the model with the accepted effects) if there is one. Until its fit is
+    /// complete, the amended model is an equation-error estimate.
     pub fn models(&self) -> Vec<GreyBox> {
         let key = self.key("fit", &self.session.effects);
         let estimate = self.estimate.as_ref().filter(|(of, _)| *of == key).map(|(_, e)| &e.model);

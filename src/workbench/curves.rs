@@ -23,13 +23,13 @@ pub struct FlightData {
     pub states: BTreeMap<&'static str, Vec<Option<f32>>>,
     /// Aileron and elevator deflection in °, throttle 0..1; `None` at a gap.
     pub controls: BTreeMap<&'static str, Vec<Option<f32>>>,
-    /// Middle of each window, s; `None` between segments.
+    /// Middle of each window over which the channels are averaged, s; `None` between segments.
     pub window_s: Vec<Option<f64>>,
-    /// Value of each regime variable in each window; `None` between segments.
+    /// Value of each regime variable (angle of attack, airspeed and so on) in each window; `None` between segments.
     pub regimes: BTreeMap<String, Vec<Option<f32>>>,
-    /// Origin of each model.
+    /// Kind of each model: as given, with fitted coefficients, or with added effects.
     pub ways: Vec<Way>,
-    /// Channels by symbol: the measured values, then the values of each model.
+    /// Forces, moments and rates by symbol: the measured values, then the values of each model.
     pub channels: BTreeMap<&'static str, Vec<Vec<Option<f32>>>>,
 }
 

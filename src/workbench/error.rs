@@ -1,4 +1,4 @@
-//! Errors of the workbench.
+//! Errors of the workbench, which amends models in a browser. Its state, with model and logs, is called the session.
 
 use std::io;
 use std::path::PathBuf;
@@ -20,11 +20,11 @@ use greylag_sysid::weak_form::prepared::ClockError;
 /// Kind of an error, which determines the HTTP status.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// The request is invalid in this session, for example because a file is not a log.
+    /// The request is invalid for this session, for example because a file is not a log.
     Bad,
     /// The session or a file has changed since the page read it.
     Conflict,
-    /// The data belong to test flights that have not been opened.
+    /// The request needs data of a test flight that the user has not opened yet.
     Locked,
     /// The requested object does not exist.
     Missing,
@@ -35,7 +35,7 @@ pub enum Kind {
 /// Reason why the workbench cannot carry out a request.
 #[derive(Debug, thiserror::Error)]
 pub enum WorkbenchError {
-    /// Another request changed the session first.
+    /// Another request has changed the session since the page read it.
     #[error(
         "the session was changed in another window: it is at revision {now}, this page was at {seen}; the page \
          shows it as it is now, so do it again if you still mean it"
@@ -73,12 +73,12 @@ pub enum WorkbenchError {
         "there is no flight number {0} in the session; it may have been taken out in another window"
     )]
     NoFlight(usize),
-    /// The flight is a test flight that has not been opened.
+    /// The flight is a test flight that the user has not opened yet. Its name is given.
     #[error(
         "{0} is a test flight, which stays unseen until the models are judged by it; press Judge, or give it another role"
     )]
     Locked(String),
-    /// No usable flight has this role.
+    /// No usable flight has this role (fit, hold out, test).
     #[error("no flight that can be used has the role {}; give one that role", .0.word())]
     NoRole(Role),
     /// The session belongs to another model.
@@ -101,7 +101,7 @@ pub enum WorkbenchError {
         "no effect was accepted by the data, so there is nothing to save: keep a refused one anyway, or take it back"
     )]
     AllRefused,
-    /// A written fit differs from the computed fit when it is read back.
+    /// A fit that was written to files differs from the computed one when it is read back.
     #[error("the fit written to {} read back with another {what}; report this", folder.display())]
     Lost {
         /// Folder of the written fit.
@@ -109,7 +109,7 @@ pub enum WorkbenchError {
         /// Part of the fit that differs.
         what: String,
     },
-    /// An internal error of the program, such as a panic of a job.
+    /// An internal error of the program, such as a panic during a computation.
     #[error("a fault of the program, please report it: {0}")]
     Fault(String),
     /// The user cancelled the task.
@@ -123,7 +123,7 @@ pub enum WorkbenchError {
     /// There is nothing to undo or redo.
     #[error("there is nothing to {0}")]
     Nothing(&'static str),
-    /// The model has a learned residual, whose file an amended model would lack.
+    /// The model has a learned residual (a neural network), whose file an amended model would lack.
     #[error(
         "model {0} has a learned residual, with which no effect can be accepted: open a session with its prior, then \
          learn the residual again"
@@ -132,20 +132,20 @@ pub enum WorkbenchError {
     /// The model or the session already contains the effect.
     #[error("{0} is in the model already")]
     Present(String),
-    /// The user's mapping is in use, and the workbench does not change it.
+    /// The logs are read with a mapping file of the user, which the workbench does not change.
     #[error(
         "the logs are read by a mapping of your own; add this line to its [columns] and start again: {0}"
     )]
     MappingGiven(String),
-    /// The session's mapping is invalid.
+    /// The mapping file of the session, which assigns log fields to columns, is invalid.
     #[error("cannot add to the mapping {}: it is not a mapping; correct or remove it", .0.display())]
     NoMapping(PathBuf),
-    /// The flight has no data at this time, s, from which a free run can start.
+    /// At this time (s), the flight has no data from which a free run (open-loop simulation) can start.
     #[error(
         "no free run can start at {0:.1} s: the aircraft is not in the air there, or the log has a gap"
     )]
     NotFlown(f64),
-    /// The accepted effects have not been fitted.
+    /// The accepted effects have not been fitted yet.
     #[error("the fit of the accepted effects is not done; wait for it, or take the effect back")]
     Unfitted,
     /// A text is not a valid effect file.
@@ -154,14 +154,14 @@ pub enum WorkbenchError {
     /// The effect is accepted and therefore cannot be removed.
     #[error("{0} is accepted; take it back first")]
     Accepted(String),
-    /// No built-in manoeuvre distinguishes the two effects.
+    /// No built-in manoeuvre can show which of the two effects the model lacks.
     #[error("no built-in manoeuvre distinguishes {} from {} within 600 s of flight; \
              treat both as indistinguishable, or give `greylag design` larger effects with --values", .0[0], .0[1])]
     NotApart([String; 2]),
-    /// A flight is in progress.
+    /// A simulated flight is in progress.
     #[error("a flight is on; stop it, or wait for its end")]
     Flying,
-    /// The ordered flight is not possible, for this reason.
+    /// The requested simulated flight is not possible, for this reason.
     #[error("cannot fly: {0}")]
     Order(String),
     /// The program was built without the simulator.
@@ -218,7 +218,7 @@ pub enum WorkbenchError {
     /// The comparison of the models failed.
     #[error(transparent)]
     Compare(#[from] CompareError),
-    /// The clock of a flight cannot be used.
+    /// The sampling interval of a flight cannot be used.
     #[error(transparent)]
     Clock(#[from] ClockError),
     /// The diagnosis of the model failed.
@@ -237,7 +237,7 @@ pub enum WorkbenchError {
 }
 
 impl WorkbenchError {
-    /// Kind of the failure.
+    /// The kind of this error.
     pub fn kind(&self) -> Kind {
         use WorkbenchError as E;
         match self {
@@ -251,7 +251,7 @@ impl WorkbenchError {
     }
 }
 
-/// An error of the operating system at `path`.
+/// The error that the operating system has reported for `path`.
 pub(super) fn io(path: &std::path::Path, source: io::Error) -> WorkbenchError {
     WorkbenchError::Io { path: path.into(), source }
 }

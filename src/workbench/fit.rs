@@ -1,4 +1,6 @@
-//! Fits the model with the accepted effects, stores the fits in the session's folder, and saves the amended model.
+//! Fits the session's model together with the effects that the user accepted to add, stores the fits in the session's folder,
+//! and saves the amended model (refitted, with added effects). Errors are those of free runs, simulations from recorded
+//! states, over the fit flights or over the held-out flights, which the fit does not use.
 
 use std::fs;
 use std::path::Path;
@@ -20,14 +22,14 @@ use greylag_sysid::weak_form::prepared::Prepared;
 
 /// File with the free-run errors over the fit flights.
 const ON_FIT: &str = "on_fit.json";
-/// Share of the progress of a first fit that the tuning of the prior takes.
+/// Share of the progress of a first fit that is taken by tuning the model without added effects.
 const TUNING: f64 = 0.4;
 
 /// A model that was fitted with accepted effects, as stored in the session's folder.
 pub struct Fitted {
     /// The model with the fitted coefficients.
     pub model: GreyBox,
-    /// Content of the file `amend.json` of the command `amend`.
+    /// Content of the file `amend.json`, as the command `greylag amend` writes it.
     pub story: Value,
     /// Free-run errors over the fit flights, of the `given` and of the `amended` model.
     pub on_fit: Value,
@@ -43,7 +45,7 @@ impl Fitted {
         Some(Fitted { model, story: json(STORY)?, on_fit: json(ON_FIT)? })
     }
 
-    /// Whether the fit added none of the accepted effects, because the data refuse them.
+    /// Whether the fit added none of the accepted effects, because all failed its checks.
     pub fn all_refused(&self) -> bool {
         self.joined().is_empty()
     }
@@ -69,7 +71,7 @@ struct Task {
 }
 
 impl Bench {
-    /// Computes the missing fits of the accepted effects, in the order of acceptance.
+    /// Computes the missing fits: one for the first accepted effect, one for the first two, and so on.
     pub(super) fn fit(&self, progress: &Progress) -> Result<(), WorkbenchError> {
         let count = self.lock().session.effects.len();
         for k in 1..=count {
@@ -146,7 +148,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Writes the amended model to `folder`, in the same files as `greylag amend`.
+    /// Writes the model with all accepted effects to `folder`, in the same files as `greylag amend`.
     pub(super) fn save(&self, folder: &Path) -> Result<(), WorkbenchError> {
         let from = {
             let inner = self.lock();
@@ -183,7 +185,7 @@ pub(super) fn scores(model: &GreyBox, flights: &[Prepared]) -> Vec<HorizonScore>
     horizons.iter().map(|h| runs.score(*h)).collect()
 }
 
-/// The logs of a role with their hashes.
+/// The usable logs of the flights with `role`, each with its hash.
 fn hashed(inner: &Inner, role: Role) -> Vec<Hashed> {
     let of = |k: &usize| {
         let path = inner.file(*k).display().to_string();
@@ -192,7 +194,7 @@ fn hashed(inner: &Inner, role: Role) -> Vec<Hashed> {
     inner.usable(&[role]).iter().map(of).collect()
 }
 
-/// Writes a fit to `folder`: first to a temporary folder, which then replaces `folder`.
+/// Writes a fit to a temporary folder, which then replaces `folder`.
 fn write(task: &Task, amended: &Amended, folder: &Path) -> Result<(), WorkbenchError> {
     let [logs, hold_out] = &task.logs;
     let slowest = task.model.airframe.envelope.flying_from_mps();

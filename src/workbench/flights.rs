@@ -1,4 +1,4 @@
-//! The session's logs in memory: read, reconstructed and ready for comparison.
+//! The logs of a session in memory: read, with reconstructed flight path, and prepared for comparison with models.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -26,9 +26,9 @@ pub struct Loaded {
     pub info: Info,
     /// Findings in the file, without those that [`Info`] adds.
     pub findings: Vec<Finding>,
-    /// The flight with the deflections as recorded.
+    /// The reconstructed flight, with the deflections at their recorded times.
     pub flight: Reconstruction,
-    /// The flight in the form for free runs and comparisons.
+    /// The flight, prepared for simulations and comparisons of models.
     pub prepared: Prepared,
 }
 
@@ -48,7 +48,8 @@ pub struct Strip {
 }
 
 impl Loaded {
-    /// Reads the log `name` with the content `bytes`, with the envelope and the mixer of `model`.
+    /// Reads the log `name` with the content `bytes`. `model` states the mixer, and the airspeed above which the aircraft counts
+    /// as flying.
     ///
     /// # Errors
     /// If the content is not a log, its flight path cannot be reconstructed, or its clock cannot be used.

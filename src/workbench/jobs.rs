@@ -1,4 +1,4 @@
-//! Long computations in the background, with progress and cancellation.
+//! Jobs of the workbench: long computations in the background, with progress and cancellation.
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -16,14 +16,14 @@ use greylag_sysid::amend::tune;
 use greylag_sysid::diagnose::{Options, diagnose};
 use greylag_sysid::progress::{FirstLook, Progress, Stage, part};
 
-/// Field of a stored diagnosis with the effect files that the diagnosis included.
+/// Name of the field of a stored diagnosis that lists the user's effect files it has tried.
 pub(super) const TRIED: &str = "tried";
 
-/// Kind of a job.
+/// The kind of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Work {
-    /// Diagnosis of the effects that the model lacks.
+    /// Diagnosis: which effects (groups of model terms) does the model lack?
     Diagnosis,
     /// Fit of the model with the accepted effects.
     Fit,
@@ -33,37 +33,37 @@ pub enum Work {
     Schedule,
 }
 
-/// A job as displayed by the page.
+/// A job as the page in the browser shows it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Job {
     /// Id of the job.
     pub id: u64,
-    /// Kind of result that the job computes.
+    /// The kind of the job.
     pub work: Work,
-    /// Key of the job's inputs; no second job with the same key is started.
+    /// Key computed from the inputs of the job. No second job with the same key is started while this one runs.
     #[serde(skip)]
     pub key: String,
     /// Current stage of the job.
     pub doing: String,
     /// Fraction of the work done, 0 to 1.
     pub fraction: f64,
-    /// Present ranking of the candidates.
+    /// Present ranking of the candidate effects in a diagnosis; otherwise empty.
     pub ranking: Vec<FirstLook>,
     #[serde(skip)]
     pub(super) stop: Stop,
 }
 
-/// Cancels a job or a flight; the computation stops at its next stage.
+/// A request to cancel a job or a flight. The computation stops at its next stage.
 #[derive(Clone, Debug, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// Ends the job at its next stage.
+    /// Requests the cancellation of the computation.
     pub fn stop(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// `Break` after the cancellation, otherwise `Continue`.
+    /// `Break` if the cancellation was requested, otherwise `Continue`.
     pub fn answer(&self) -> ControlFlow<()> {
         match self.0.load(Ordering::Relaxed) {
             true => ControlFlow::Break(()),
@@ -72,7 +72,7 @@ impl Stop {
     }
 }
 
-/// Events for the connected pages.
+/// An event that is sent to all connected pages.
 #[derive(Clone, Debug, Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
@@ -86,7 +86,7 @@ pub enum Event {
         /// The new part of the flight.
         part: Part,
     },
-    /// The session or its results have changed; a page has to read the state again.
+    /// The session (model, logs, accepted effects) or its results have changed. A page must read the state again.
     Changed {
         /// Present revision of the session.
         revision: u64,
@@ -94,20 +94,20 @@ pub enum Event {
 }
 
 impl Inner {
-    /// Removes the jobs of a kind from the list; each of them stops at its next stage.
+    /// Removes all jobs of the kind `work` from the list and requests their cancellation.
     pub(super) fn supersede(&mut self, work: Work) {
         self.jobs.iter().filter(|job| job.work == work).for_each(|job| job.stop.stop());
         self.jobs.retain(|job| job.work != work);
     }
 
-    /// Whether every fit of the accepted effects exists.
+    /// Whether all fits exist: for each n, the fit with the first n accepted effects.
     fn fitted(&self) -> bool {
         let all = &self.session.effects;
         (1..=all.len()).all(|count| self.fits.contains_key(&self.key("fit", &all[..count])))
     }
 }
 
-/// Outcome of a job. A panic becomes an error, because otherwise the job would appear to run forever.
+/// Runs `work` and returns its result. A panic becomes an error, because otherwise the job would appear to run forever.
 fn outcome(work: impl FnOnce() -> Result<(), WorkbenchError>) -> Result<(), WorkbenchError> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let said = panic.downcast_ref::<&str>().map(ToString::to_string);
@@ -117,12 +117,12 @@ fn outcome(work: impl FnOnce() -> Result<(), WorkbenchError>) -> Result<(), Work
 }
 
 impl Bench {
-    /// Announces a change of results without a change of the session.
+    /// Tells the pages that results have changed.
     pub(super) fn changed(&self) {
         (self.on_event)(Event::Changed { revision: self.revision() });
     }
 
-    /// Starts a job, unless a job with the same key runs or, for a fit, all fits exist.
+    /// Starts a job of the kind `work`. Does nothing if a job with the same key is running, or if all fits exist already.
     pub(super) fn start(self: &Arc<Self>, work: Work) {
         let (id, stop) = {
             let mut inner = self.lock();
@@ -156,7 +156,7 @@ impl Bench {
         std::thread::spawn(move || bench.work(id, work, &stop));
     }
 
-    /// Removes the job `id` from the list; the job stops at its next stage.
+    /// Removes the job `id` from the list and requests its cancellation.
     pub(super) fn cancel(&self, id: u64) {
         let mut inner = self.lock();
         inner.jobs.iter().filter(|job| job.id == id).for_each(|job| job.stop.stop());
@@ -201,7 +201,7 @@ impl Bench {
         (self.on_event)(Event::Progress { job });
     }
 
-    /// Diagnoses the given model over the fit flights, then tunes its coefficients for later fits.
+    /// Diagnoses the given model with the flights that have the role Fit. Then fits its coefficients, as a start for later fits.
     fn diagnose(&self, progress: &Progress) -> Result<(), WorkbenchError> {
         let ([key, tuned_key], model, flights, divided, with, tried) = {
             let inner = self.lock();
@@ -223,7 +223,7 @@ impl Bench {
         self.lock().diagnosis = Some((key, Arc::new(value)));
         self.changed();
         let there = self.lock().tuned.as_ref().is_some_and(|(of, _)| *of == tuned_key);
-        // errors of the division of flights and of the tuning are reported when the user accepts an effect
+        // errors of the fit are not reported here: they occur again, and are shown, when the user accepts an effect
         if let (false, Ok(Divided { fit, .. })) = (there, divided)
             && let Ok(tuned) = tune(&model, &fit, &part(progress, [0.95, 1.0]))
         {

@@ -1,4 +1,5 @@
-//! Keys of results. A key contains a hash of all inputs of a result, so a stored result is valid as long as its key is unchanged.
+//! Keys of stored results. A key contains a hash of all inputs of a result. A stored result is therefore valid if its key
+//! equals the key for the present inputs.
 
 use std::path::{Path, PathBuf};
 use std::{fs, io};
@@ -9,7 +10,8 @@ use greylag_physics::formula::register;
 use greylag_sysid::amend::document::sha256;
 
 impl Inner {
-    /// Key of a result `what` from its inputs: model, options for reading logs, flights by role, effects.
+    /// Key of a result of the kind `what`. The inputs are the version of the program, the model, the options for reading logs,
+    /// the flights with their roles, and `effects`.
     pub fn key(&self, what: &str, effects: &[Accepted]) -> String {
         // flight names are included because results contain them; logs that cannot be read are not used
         let logs = |role: Role| -> String {
@@ -39,7 +41,7 @@ impl Inner {
     }
 }
 
-/// SHA-256 of all files of the model at `path`: the model file, its airframe, its residual and its effect files.
+/// One SHA-256 over all files of the model at `path`: the model file, its airframe, its residual and its effect files.
 pub fn fingerprint(path: &Path) -> io::Result<String> {
     let text = fs::read_to_string(path)?;
     let table: toml::Table = toml::from_str(&text).unwrap_or_default();
@@ -55,7 +57,7 @@ pub fn fingerprint(path: &Path) -> io::Result<String> {
     Ok(sha256(all.as_bytes()))
 }
 
-/// The file at `path`, or all `.toml` files if `path` is a folder.
+/// The file at `path` or, if `path` is a folder, all `.toml` files in it.
 fn files(path: &Path) -> io::Result<Vec<PathBuf>> {
     if !path.is_dir() {
         return Ok(vec![path.into()]);

@@ -1,4 +1,4 @@
-//! The session's mapping, which corrects wrong units or signs of logs.
+//! The mapping of a workbench session: factors that correct wrong units or signs of logs.
 
 use std::fs;
 use std::path::PathBuf;
@@ -15,7 +15,8 @@ fn number(value: &toml::Value) -> Option<f64> {
     value.as_float().or(value.as_integer().map(|n| n as f64))
 }
 
-/// Adds a column to the mapping `text`, or multiplies the scale of a column in it; `None` if `text` is not a mapping.
+/// Adds a factor for a column to the mapping `text`, or multiplies the factor that the column already has. `None` if `text` is
+/// not a mapping.
 fn with_column(text: &str, column: &str, from: &str, scale: f64) -> Option<String> {
     let mut table: toml::Table = toml::from_str(text).ok()?;
     table.insert("schema".into(), 1.into());
@@ -33,7 +34,7 @@ fn with_column(text: &str, column: &str, from: &str, scale: f64) -> Option<Strin
 }
 
 impl Bench {
-    /// Adds a factor for a column to the session's mapping, and reads the logs again.
+    /// Adds a factor for a column to the session's mapping, and reads all logs again.
     pub(super) fn map(
         &self,
         seen: u64,
@@ -46,7 +47,7 @@ impl Bench {
         let mapped = self.change(seen, |inner| {
             let before = inner.mapping.text.clone();
             inner.map(place, column, scale)?;
-            // written last, because the next start of the workbench reads this file
+            // the file is written last, because the next start of the workbench reads it
             replaced = Some(before);
             Ok(write_over(&path, &inner.mapping.text)?)
         });
@@ -61,8 +62,8 @@ impl Bench {
 }
 
 impl Inner {
-    /// Reads the logs again with one more factor. Logs that still have problems become unused, unless the user wants
-    /// such logs (`--despite-problems`). The log at `place` gets its default role if its problems are corrected.
+    /// Reads the logs again with one more factor. Logs that still have problems get the role of unused flights, unless the user
+    /// wants such logs (`--despite-problems`). The log at `place` gets its default role again if its problems are corrected.
     fn map(&mut self, place: usize, column: &str, scale: f64) -> Result<(), WorkbenchError> {
         let path = self.folder.join(FILE);
         let flight = self.flights.get(place).and_then(|f| f.as_ref().ok());

@@ -1,4 +1,5 @@
-//! Effects that the user writes as text: they are checked, stored, and tried like effects of the catalogue.
+//! Effects that the user of the workbench writes as the text of an effect file (TOML). They are checked, stored, and then
+//! diagnosed and fitted like effects of the catalogue.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -39,7 +40,7 @@ pub struct OwnView {
     text: String,
 }
 
-/// Description of a valid effect file.
+/// Content of a valid effect file.
 #[derive(Clone, Debug, Serialize)]
 pub struct Checked {
     /// Id of the effect.
@@ -52,7 +53,7 @@ pub struct Checked {
     pub status: Status,
 }
 
-/// Names that an effect file may contain, and an example.
+/// Names of variables and functions that the formula of an effect file may contain, and an example.
 pub fn grammar() -> Value {
     let variable = |v: &Variable| json!([v.name(), v.alias(), v.meaning()]);
     let functions = Function::ALL.iter().filter(|f| !f.is_operator());
@@ -72,7 +73,7 @@ pub fn check(text: &str) -> Result<Checked, WorkbenchError> {
 }
 
 impl Bench {
-    /// Adds an effect that is written as text to the session; it replaces an effect with the same id.
+    /// Adds an effect, given as text, to the session. It replaces an effect with the same id.
     pub(super) fn write_effect(
         self: &std::sync::Arc<Self>,
         seen: u64,
@@ -122,9 +123,10 @@ impl Bench {
         })
     }
 
-    /// Contribution of the accepted effect `id` in the channel in which it is largest, over the variable that shows it best. The
-    /// result also contains the residual of the model without the effect. It is computed from the fit if the fit is complete,
-    /// otherwise from the estimate. `None` if there is neither, or if the effect has no linear coefficients.
+    /// Contribution of the accepted effect `id` in the channel in which it is largest relative to the residual, over the regime
+    /// variable (such as the angle of attack) that explains most of it. The result also contains the residual of the model
+    /// without the effect. It is computed with the fitted model or, until the fit is complete, with the estimated one. `None` if
+    /// there is neither, or if the effect has no linear coefficients.
     ///
     /// # Errors
     /// If the flights cannot be compared.
@@ -146,8 +148,8 @@ impl Bench {
     }
 }
 
-/// The flights that a comparison uses, in its order: those with a window. `slowest` is the airspeed at which flight
-/// begins, m/s.
+/// Prepares the flights that a comparison uses, in the same order: those with at least one window. `slowest` is the airspeed
+/// above which the aircraft counts as flying, m/s.
 fn compared(flights: &[Reconstruction], slowest: f64) -> Result<Vec<Prepared>, ClockError> {
     let prepared = flights.iter().map(|f| Prepared::new(f, slowest));
     let mut prepared = prepared.collect::<Result<Vec<_>, _>>()?;
@@ -164,14 +166,14 @@ struct Made {
 }
 
 impl Made {
-    /// Energy of the contribution divided by the energy of the residual without the effect.
+    /// Sum of squares of the contribution divided by that of the residual of the model without the effect.
     fn weight(&self) -> f64 {
         let power = |list: &[f64]| list.iter().map(|x| x * x).sum::<f64>();
         power(&self.made) / power(&self.left).max(f64::MIN_POSITIVE)
     }
 }
 
-/// The second model's prediction minus the first model's in a channel; `None` if the channel is not measured.
+/// Difference between the predictions of the second and the first model in a channel; `None` if the channel is not measured.
 fn made(comparison: &compare::Comparison, flights: &[Prepared], id: ChannelId) -> Option<Made> {
     let mut all = Made { id, made: Vec::new(), left: Vec::new(), regimes: Vec::new() };
     let [without, with] = &comparison.models[..] else { return None };
@@ -194,7 +196,7 @@ fn made(comparison: &compare::Comparison, flights: &[Prepared], id: ChannelId) -
     (!all.made.is_empty()).then_some(all)
 }
 
-/// The model with the linear coefficients of the effect set to zero; `None` if there are none.
+/// Returns the model with the linear coefficients of the effect set to zero; `None` if there are none.
 fn zeroed(model: &GreyBox, id: &str) -> Option<GreyBox> {
     let about = catalogue::describe(id)?;
     let linear = about.coefficients.len().checked_sub(about.shape)?;
@@ -207,7 +209,7 @@ fn zeroed(model: &GreyBox, id: &str) -> Option<GreyBox> {
 }
 
 impl Inner {
-    /// Loads the session's effect files, which makes their ids available.
+    /// Loads the session's effect files. Their effects can then be found by id.
     pub(super) fn read_own(&self) -> Result<(), WorkbenchError> {
         for id in &self.session.own {
             register::load(&effect_file(&self.folder, id))?;
@@ -215,7 +217,7 @@ impl Inner {
         Ok(())
     }
 
-    /// Ids and hashes of the session's effect files, which a new diagnosis would include.
+    /// Ids and hashes of the session's effect files. A new diagnosis includes these effects as candidates.
     pub(super) fn tried(&self) -> Value {
         let text = |id: &String| register::find(id).map_or("", |effect| effect.text.as_str());
         self.session.own.iter().map(|id| json!([id, sha256(text(id).as_bytes())])).collect()

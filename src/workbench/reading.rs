@@ -1,4 +1,5 @@
-//! Options for reading the session's logs: those of the command line, and the session's mapping if the command line names none.
+//! Options for reading the session's logs. They come from the command line. A mapping file assigns the columns of a log to
+//! those of this program. If the command line names none, the session's own mapping is used.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -53,7 +54,7 @@ impl Reading {
 
 impl Bench {
     /// Adds the log at `path`, which the command line names; does nothing if the session already contains it. A log that cannot
-    /// be used joins the session as an unused flight with its error, so that the session opens.
+    /// be used is added as an unused flight with its error, so that the session can be opened.
     ///
     /// # Errors
     /// If the file cannot be read or the session cannot be written.
@@ -76,7 +77,8 @@ impl Bench {
 }
 
 impl Inner {
-    /// Adds a log that cannot be used, for the reason `why`. A log of the same path stays: its error says that it has changed.
+    /// Adds a log that cannot be used, for the reason `why`. If the session has a log of the same path, it is kept; its own error
+    /// says that the file has changed.
     fn take_unusable(&mut self, entry: LogEntry, why: String) {
         let there = self.session.logs.iter().any(|l| self.folder.join(&l.path) == entry.path);
         if !there {

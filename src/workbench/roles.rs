@@ -1,6 +1,7 @@
-//! Roles of the session's logs, and the names of flights in commands.
+//! Roles of the logs in a session of the workbench (fit, hold out, test, unused), and the names of their flights.
 //!
-//! `Session::usual_role` in `session.rs` selects the role of a new log.
+//! A test flight is locked: nothing computed from it is shown until the user opens it to judge the models. `Session::usual_role`
+//! in `session.rs` selects the role of a new log.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -20,14 +21,14 @@ pub struct Divided {
     pub fit: Vec<Reconstruction>,
     /// Flights for the validation of the fit.
     pub held_out: Vec<Reconstruction>,
-    /// Notes on findings in the logs.
+    /// Notes on defects and peculiarities of the logs.
     pub notes: Vec<String>,
 }
 
 impl Inner {
-    /// Adds a log to the session with `role`; `None` selects the default role. The log replaces a log with the same
-    /// path. A log that was removed as an unopened test flight becomes a test flight again, because another role
-    /// would open it without a record.
+    /// Adds the log `entry`, which was read as `loaded`, to the session. Its role is `role`, or the usual one for `None`. It
+    /// replaces a log with the same path. A log that was removed while it was a locked test flight becomes a test flight again,
+    /// because with another role it would be opened without a record.
     pub fn take_in(&mut self, entry: LogEntry, role: Option<Role>, loaded: Arc<Loaded>) {
         let file = self.folder.join(&entry.path);
         let before = self.session.logs.iter().position(|l| self.folder.join(&l.path) == file);
@@ -36,7 +37,7 @@ impl Inner {
             (None, Some(place)) => self.session.logs[place].role,
             (None, None) => self.session.usual_role(&entry.name()),
         };
-        // a log with problems stays unused until the user gives it a role, unless the user wants such logs
+        // a log with problems is not used until the user gives it a role, unless the user asked for such logs
         let refused = loaded.in_doubt() && !self.given.despite_problems;
         let removed = self.session.removed_tests.iter().position(|known| *known == entry.sha256);
         let role = match removed {
@@ -62,7 +63,7 @@ impl Inner {
         }
     }
 
-    /// Keeps the hash of the log with index `place`, which is about to be removed, if it is a locked test flight.
+    /// Records the hash of the log with the index `place`, which is about to be removed, if it is a locked test flight.
     pub fn note_removal(&mut self, place: usize) {
         let log = &self.session.logs[place];
         if self.locked(log) && !self.session.removed_tests.contains(&log.sha256) {
@@ -70,7 +71,7 @@ impl Inner {
         }
     }
 
-    /// Changes the role of a log. If this opens a locked test flight, the opening is recorded.
+    /// Changes the role of the log with the index `place`. If this opens a locked test flight, the opening is recorded.
     pub fn give_role(&mut self, place: usize, role: Role) -> Result<(), WorkbenchError> {
         let log = self.session.logs.get(place).ok_or(WorkbenchError::NoFlight(place))?;
         if role != Role::Test && self.locked(log) && self.flights[place].is_ok() {
@@ -90,9 +91,9 @@ impl Inner {
         Ok(())
     }
 
-    /// Whether a flight is a test flight that has not been opened.
+    /// Whether `log` is a locked test flight: one that the user has not opened yet.
     pub fn locked(&self, log: &LogEntry) -> bool {
-        // older sessions without hashes identify flights by name
+        // sessions of older versions have no hashes and identify flights by name
         let opened = self.session.openings.iter().any(|o| match o.sha256.is_empty() {
             true => o.flights.contains(&log.name()),
             false => o.sha256.contains(&log.sha256),
@@ -100,17 +101,17 @@ impl Inner {
         log.role == Role::Test && !opened
     }
 
-    /// Path of a log.
+    /// Path of the log with the index `place`.
     pub fn file(&self, place: usize) -> PathBuf {
         self.folder.join(&self.session.logs[place].path)
     }
 
-    /// Names of the flights in the output of a command that reads these logs.
+    /// Names of the flights of the logs `places`, as in the output of a command that reads these logs.
     pub fn names(&self, places: &[usize]) -> Vec<String> {
         names(&places.iter().map(|k| self.file(*k)).collect::<Vec<_>>())
     }
 
-    /// Indices of the usable logs with one of `roles`, in order.
+    /// Indices of the usable logs that have one of `roles`, in ascending order.
     pub fn usable(&self, roles: &[Role]) -> Vec<usize> {
         let logs = self.session.logs.iter().zip(&self.flights).enumerate();
         let usable = logs.filter(|(_, (log, flight))| roles.contains(&log.role) && flight.is_ok());
@@ -131,7 +132,7 @@ impl Inner {
         places.iter().zip(self.names(places)).filter_map(of).collect()
     }
 
-    /// The flights with the role Fit, each in full length.
+    /// The flights with the role Fit, each in its full length.
     pub fn to_fit(&self) -> Result<Vec<Reconstruction>, WorkbenchError> {
         match self.usable(&[Role::Fit])[..] {
             [] => Err(WorkbenchError::NoRole(Role::Fit)),
@@ -139,7 +140,7 @@ impl Inner {
         }
     }
 
-    /// The flights for a fit and for its validation, divided as in `greylag amend`, with the notes of that command.
+    /// Divides the flights into those for a fit and those for its validation, as `greylag amend` does.
     pub fn divided(&self) -> Result<Divided, WorkbenchError> {
         let fit = self.to_fit()?;
         let held = self.usable(&[Role::HoldOut]);
@@ -159,7 +160,7 @@ impl Inner {
         }
     }
 
-    /// Findings in the logs at the indices `places`, as a command prints them.
+    /// Defects and peculiarities of the logs with the indices `places`, as a command prints them.
     fn findings(&self, places: &[usize]) -> Vec<String> {
         let of = |(k, name): (&usize, String)| {
             let all = self.flights[*k].iter().flat_map(|flight| flight.findings.clone());

@@ -64,12 +64,12 @@ impl LogEntry {
 pub struct Accepted {
     /// Id of the effect.
     pub id: String,
-    /// Whether the effect is kept although the data refuse it.
+    /// Whether the effect is kept although it fails a check on the held-out flights or on its coefficients.
     #[serde(default)]
     pub anyway: bool,
 }
 
-/// Reason why test flights were opened.
+/// Reason why test flights were opened, which ends their lock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Occasion {

@@ -1,4 +1,5 @@
-//! The tuned model: its coefficients are fitted and no effect is added, so only missing effects can explain its remaining error.
+//! The tuned model of a session of the workbench: the given model with its coefficients fitted to the flights and no effect
+//! (group of model terms) added. Its remaining error shows what the model lacks.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -11,31 +12,31 @@ use greylag_model::GreyBox;
 use greylag_report::write_over;
 use greylag_sysid::amend::Fit;
 
-/// Origin of a displayed model.
+/// Which of the session's models is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Way {
-    /// The model of the model file.
+    /// The model as its file states it.
     Given,
-    /// The model with fitted coefficients and no added effect.
+    /// The given model with its coefficients fitted.
     Tuned,
-    /// The model with the accepted effects.
+    /// The fitted model with the accepted effects.
     Amended,
 }
 
 impl Bench {
-    /// Stores a fit of the model's coefficients, in memory and in a file for a later run.
+    /// Stores `fit`, a fit without added effects, in memory and in a file for a later run of the program.
     pub(super) fn keep_tuned(&self, key: String, fit: Fit) {
         let values: BTreeMap<&str, f64> =
             fit.parameters.iter().map(|p| (p.name.as_str(), p.value)).collect();
-        // if the file cannot be written, a later run tunes again
+        // if the file cannot be written, a later run of the program makes the fit again
         let _ = write_over(&self.result_file(&key), json!(values).to_string());
         self.lock().tuned = Some((key, fit));
     }
 }
 
 impl Inner {
-    /// The model tuned to the present flights; `None` before the tuning.
+    /// The model tuned to the present flights, from memory or from the file; `None` if it was not tuned to them yet.
     fn tuned_model(&self) -> Option<GreyBox> {
         let key = self.key("tuned", &[]);
         let mut model = match self.tuned.as_ref().filter(|(of, _)| *of == key) {
@@ -52,7 +53,7 @@ impl Inner {
         Some(model)
     }
 
-    /// The given, the tuned and the amended model; models that are not fitted yet are left out.
+    /// The given, the tuned and the amended model, each with its kind. A model that was not fitted yet is left out.
     pub(super) fn ways(&self) -> (Vec<Way>, Vec<GreyBox>) {
         let mut models = self.models();
         let amended = (models.len() > 1).then(|| models.remove(1));

@@ -1,4 +1,5 @@
-//! Views of the session as JSON for a page.
+//! The state of a workbench session as JSON for its page. A session has a model, flights with roles, and effects that the user
+//! accepted to add to the model. An amended model is refitted with these effects.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -24,7 +25,7 @@ use greylag_logs::phases::Phase;
 use greylag_sysid::compare::{self, FlightResult, ModelResult, compare, free_run};
 use greylag_sysid::progress::ignore_progress;
 
-/// Longest duration of a free run, s.
+/// Longest duration of a free run (simulation from a recorded state), s.
 const LONGEST_S: f64 = 60.0;
 
 /// A flight in the list of flights.
@@ -33,7 +34,7 @@ struct FlightView<'a> {
     name: String,
     path: String,
     role: Role,
-    /// Whether the flight is a test flight that has not been opened.
+    /// Whether the flight is a test flight that has not been opened. Its data are hidden until then.
     locked: bool,
     error: Option<&'a str>,
     #[serde(flatten)]
@@ -66,13 +67,13 @@ struct StepView {
     /// One of `fitted`, `fitting`, `failed`, `unfitted`.
     status: &'static str,
     error: Option<String>,
-    /// Errors of the equation-error estimate on the hold-out flights; `None` once the fit is complete.
+    /// Free-run errors of the preliminary estimate (by equation error) on the hold-out flights; `None` once the fit is complete.
     estimated: Option<Value>,
     story: Option<Value>,
     on_fit: Option<Value>,
 }
 
-/// The state of the session without curves.
+/// The state of the session, without the data of curves.
 #[derive(Serialize)]
 struct StateView<'a> {
     schema: &'static str,
@@ -95,11 +96,11 @@ struct StateView<'a> {
     commands: Commands,
 }
 
-/// Errors of the models by channel and regime.
+/// Errors of the models by channel (force, moment or rate) and by regime (range of a variable, such as α).
 #[derive(Serialize)]
 struct FailingView<'a> {
     flights: Vec<usize>,
-    /// Origin of each model.
+    /// Origin of each model: given, tuned or amended.
     ways: Vec<Way>,
     models: &'a [ModelResult],
     notes: &'a [String],
@@ -111,7 +112,7 @@ struct FailingView<'a> {
 pub struct RunRequest {
     /// Index of the flight in the session.
     pub flight: usize,
-    /// Start of the run, s, on the log's clock.
+    /// Start of the run in the time of the log, s.
     pub time_s: f64,
     /// Duration of the run, s; limited to 0.1 to 60 s.
     pub seconds: f64,
@@ -120,7 +121,7 @@ pub struct RunRequest {
 /// Free runs of all models from the same state.
 #[derive(Clone, Debug, Serialize)]
 pub struct FreeRun {
-    /// The runs of the given, the tuned and the amended model; models that are not fitted yet are left out.
+    /// The runs of the given, the tuned and the amended model. Models that are not fitted yet are left out.
     pub runs: Vec<OneRun>,
 }
 
@@ -131,14 +132,14 @@ pub struct OneRun {
     pub way: Way,
     /// Name of the model.
     pub model: String,
-    /// Time on the log's clock, s.
+    /// Times of the states in the time of the log, s.
     pub time_s: Vec<f64>,
     /// The states by name, in °, °/s and m/s.
     pub states: BTreeMap<&'static str, Vec<Option<f32>>>,
 }
 
 impl Bench {
-    /// The state of the session as JSON, without curves.
+    /// The state of the session as JSON, without the data of curves.
     ///
     /// # Errors
     /// If a number cannot be represented in JSON.
@@ -203,7 +204,8 @@ impl Bench {
     /// One flight over time, as measured and as predicted by the models.
     ///
     /// # Errors
-    /// `WorkbenchError::NoFlight` if the flight does not exist, and `WorkbenchError::Locked` if it has not been opened.
+    /// `WorkbenchError::NoFlight` if the flight does not exist, and `WorkbenchError::Locked` if it is a test flight that has
+    /// not been opened.
     pub fn flight(&self, place: usize) -> Result<FlightData, WorkbenchError> {
         let flight = self.may_be_seen(place)?;
         let missing = WorkbenchError::NoFlight(place);
@@ -229,8 +231,8 @@ impl Bench {
     /// Free runs of the models from one time of a flight.
     ///
     /// # Errors
-    /// `WorkbenchError::Locked` if the flight has not been opened, and `WorkbenchError::NotFlown` if the aircraft is not in
-    /// flight at that time.
+    /// `WorkbenchError::NoFlight` if the flight does not exist, `WorkbenchError::Locked` if it is a test flight that has not been
+    /// opened, and `WorkbenchError::NotFlown` if the aircraft is not in flight at that time.
     pub fn free_run(&self, request: RunRequest) -> Result<FreeRun, WorkbenchError> {
         let flight = self.may_be_seen(request.flight)?;
         let (ways, models) = self.lock().ways();
@@ -248,7 +250,7 @@ impl Bench {
         Ok(FreeRun { runs: runs.ok_or(WorkbenchError::NotFlown(request.time_s))? })
     }
 
-    /// A flight, unless it is a locked test flight.
+    /// The flight with the index `place`, unless it is a locked test flight.
     fn may_be_seen(&self, place: usize) -> Result<Arc<Loaded>, WorkbenchError> {
         let inner = self.lock();
         let log = inner.session.logs.get(place).ok_or(WorkbenchError::NoFlight(place))?;
@@ -260,21 +262,21 @@ impl Bench {
     }
 }
 
-/// Whether a result exists, its key, and the error of its job.
+/// Description of a result: whether it exists, whether it lacks newer effects, its key, and the error of its job.
 fn result(inner: &Inner, known: &Option<(String, Arc<Value>)>, work: Work) -> Value {
     let key = inner.key(work.word(), &[]);
     let known = known.as_ref().filter(|(of, _)| *of == key);
     let tried = known.map_or(&Value::Null, |(_, value)| &value[TRIED]);
     json!({
         "there": known.is_some(),
-        // a diagnosis from before the last effect was written does not rank that effect
+        // a diagnosis that was made before the user wrote the last effect does not rank that effect
         "behind": tried.is_array() && *tried != inner.tried(),
         "error": inner.failures.get(&key),
         "key": key,
     })
 }
 
-/// Error of the schedule design for the last pair of effects; `None` without an error.
+/// Error of designing a schedule that separates the last pair of effects; `None` without an error.
 fn design_failure(inner: &Inner) -> Option<&String> {
     let pair = inner.between.as_ref()?.join("-");
     inner.failures.get(&(inner.key(Work::Schedule.word(), &[]) + &pair))

@@ -1,4 +1,5 @@
-//! `greylag aircraft check`: computes trim, modes, control authority and stability margins of a model's aircraft.
+//! `greylag aircraft check`: computes trim, modes, control authority and stability margins of the aircraft that a model
+//! describes.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -23,7 +24,7 @@ pub struct Arguments {
     /// Model of the aircraft.
     #[arg(long, value_name = "FILE")]
     model: PathBuf,
-    /// Write the page of the aircraft: three views, trim, modes, and the response to the stick.
+    /// Write an HTML page on the aircraft: three-view drawing, trim, modes, and responses to stick inputs.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     #[command(flatten)]
@@ -70,7 +71,7 @@ pub fn status(found: &AircraftCheck) -> ExitCode {
     if found.findings.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(IN_DOUBT) }
 }
 
-/// The page of the aircraft of `model`. `file` is the path of the model file.
+/// Renders the HTML page on the aircraft of `model`. `file` is the path of the model file.
 ///
 /// # Errors
 /// If the aircraft cannot be trimmed or stabilised at its cruise airspeed.
@@ -85,7 +86,7 @@ pub fn page(file: &Path, model: &GreyBox) -> Result<String> {
     Ok(report.page().render())
 }
 
-/// Prints trim, modes, control authority and the margins of the LQI's loops, then the findings.
+/// Prints trim, modes, control authority and the stability margins of the LQI's loops, then what should be corrected.
 pub fn print(found: &AircraftCheck) {
     println!("\n{}", levels(found));
     println!("\n{}", modes(found));

@@ -1,4 +1,6 @@
-//! `greylag aircraft draw`: draws aircraft from a distribution, and compares models with them.
+//! `greylag aircraft draw`: draws random aircraft from a distribution, and compares given models with the draws.
+//!
+//! The comparison is by traits: dimensionless flight characteristics such as the static margin.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -12,7 +14,7 @@ use crate::model::GreyBox;
 use crate::model::population::{Character, Drawn, Population, TRAITS};
 use crate::num::statistics::quantile;
 
-/// Models of the shipped aircraft, which are compared with the draws by default.
+/// Models that are compared with the draws by default: those of the aircraft in `params/`.
 const SHIPPED: [&str; 5] = [
     "params/x8/jsbsim.toml",
     "params/aerosonde/jsbsim.toml",
@@ -20,28 +22,28 @@ const SHIPPED: [&str; 5] = [
     "params/c172p-flaps/jsbsim.toml",
     "params/a430/prior.toml",
 ];
-/// An aircraft counts as covered if each of its traits lies between these quantiles of the draws.
+/// An aircraft lies inside the distribution if each of its traits lies between these quantiles of the draws.
 const INSIDE: [f64; 2] = [0.005, 0.995];
 
 /// Options of `greylag aircraft draw`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Distribution to draw from.
+    /// File of the distribution that the aircraft are drawn from.
     #[arg(long, value_name = "FILE", default_value = "params/any/aircraft.toml")]
     population: PathBuf,
-    /// Seed of the draws.
+    /// Seed of the random draws.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Number of aircraft to draw.
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     count: u32,
-    /// Number of draws, from the first one, to list individually.
+    /// List the first N drawn aircraft individually.
     #[arg(long, value_name = "N", default_value_t = 0)]
     show: usize,
     /// Models to compare with the draws [default: those of the shipped aircraft].
     #[arg(long = "model", value_name = "FILE", num_args = 1..)]
     models: Vec<PathBuf>,
-    /// Folder for the files: airframe.toml and model.toml of each draw, in a subfolder named by its number.
+    /// Write airframe.toml and model.toml of each drawn aircraft to a subfolder of this folder, named by the number of the draw.
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
 }
@@ -131,8 +133,8 @@ fn listed(drawn: &Drawn) -> Vec<String> {
     ]
 }
 
-/// Prints the quantiles of each trait and the values of the models `placed`. Then prints the traits in which a model
-/// lies outside the draws.
+/// Prints a table with the quantiles of each trait over the draws, and its values in the models `placed`. Below, prints the
+/// meaning of each trait, and the traits in which each model lies outside the quantiles [`INSIDE`].
 fn print(characters: &[Character], placed: &[(GreyBox, Character)]) {
     let mut table = Table::new();
     table.load_style(NOTHING);

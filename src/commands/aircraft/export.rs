@@ -1,4 +1,4 @@
-//! `greylag aircraft export`: writes a model as an aircraft of another program.
+//! `greylag aircraft export`: writes a model as an aircraft of another simulator.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -19,24 +19,24 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum To {
-    /// As a JSBSim aircraft: NAME/NAME.xml with its engine.
+    /// Write a JSBSim aircraft: NAME/NAME.xml and the files of its engine.
     Jsbsim(Jsbsim),
 }
 
 /// The arguments of `greylag aircraft export jsbsim`.
 #[derive(Args)]
 struct Jsbsim {
-    /// The model. Repeat it for models of one aircraft in several conditions, such as flap
-    /// settings: the aircraft then reads the property in which their airframes differ.
+    /// The model file. Give several for one aircraft in several conditions, such as flap settings:
+    /// the aircraft then interpolates between them over the property in which their airframes differ.
     #[arg(long, value_name = "FILE", required = true)]
     model: Vec<PathBuf>,
-    /// Folder in which the aircraft's folder is made.
+    /// Folder in which the folder NAME is made.
     dir: PathBuf,
     /// Name of the JSBSim aircraft: letters, digits, `_` and `-`.
     name: String,
 }
 
-/// Writes the aircraft's files and lists the properties that the format cannot represent.
+/// Writes the aircraft's files and lists the properties of the model that the export omits.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let To::Jsbsim(jsbsim) = &arguments.to;
     let Jsbsim { dir, name, .. } = jsbsim;

@@ -16,7 +16,7 @@ use crate::model::GreyBox;
 
 /// Largest ratio of standard deviation to magnitude at which a coefficient counts as determined.
 const KNOWN: f64 = 0.3;
-/// Prefixes of coefficients' names, each with a manoeuvre that excites these coefficients.
+/// Prefixes of coefficient names, each with a manoeuvre that excites the coefficients with this prefix.
 const MANOEUVRES: [(&str, &str); 7] = [
     ("roll_linear", "aileron doublets, then bank to bank reversals"),
     ("pitch_linear", "elevator doublets at three airspeeds"),
@@ -30,7 +30,7 @@ const MANOEUVRES: [(&str, &str); 7] = [
 /// Options of `greylag aircraft from-log`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Folder to make: the estimate in `prior`, the fitted aircraft beside it.
+    /// Folder to make. It receives the fitted aircraft, and its subfolder `prior` the aircraft before the fit.
     folder: PathBuf,
     /// Wing span.
     #[arg(long, value_name = "M")]
@@ -44,8 +44,8 @@ pub struct Arguments {
     logs: LogArguments,
 }
 
-/// Writes the model estimated from the dimensions, fits it to the logs, writes the page of the fitted aircraft and
-/// recommends further flights.
+/// Estimates a model from the dimensions and fits it to the logs. Writes both models and a page about the fitted aircraft,
+/// and recommends further flights.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let Arguments { folder, span_m, area_m2, common, logs } = arguments;
     if folder.join("model.toml").exists() {
@@ -81,8 +81,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(status)
 }
 
-/// Removes the files that a failed run wrote, so that the corrected command can be run again. `made` tells whether the run
-/// created `folder` and `prior`. A folder that existed before keeps its other files.
+/// Removes the files that a failed run wrote, so that the user can run the corrected command. `made` states whether the run
+/// created `folder` and `prior`. A folder that existed before the run keeps its other files.
 fn remove(folder: &Path, prior: &Path, made: [bool; 2]) {
     let _ = match made {
         [true, _] => std::fs::remove_dir_all(folder),
@@ -93,7 +93,7 @@ fn remove(folder: &Path, prior: &Path, made: [bool; 2]) {
     };
 }
 
-/// Recommends manoeuvres for the coefficients that the flights do not determine.
+/// Prints manoeuvres for the coefficients that the flights do not determine, and the next command.
 fn next(folder: &Path, fitted: &Path) -> Result<()> {
     let text = std::fs::read_to_string(folder.join("amend.json"))?;
     let story: serde_json::Value = serde_json::from_str(&text)?;
@@ -127,8 +127,8 @@ fn next(folder: &Path, fitted: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Names of the coefficients that the flights do not determine. A standard deviation of `null` in the file was not finite,
-/// so its coefficient counts as not determined.
+/// Names of the coefficients that the flights do not determine. JSON holds `null` for a standard deviation that is not
+/// finite. Such a coefficient counts as not determined.
 fn unknown(story: &serde_json::Value) -> Vec<String> {
     let all = story["parameters"].as_array().into_iter().flatten();
     let unknown = all.filter(|p| match (p["value"].as_f64(), p["sd"].as_f64()) {

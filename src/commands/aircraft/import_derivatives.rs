@@ -1,5 +1,5 @@
-//! `greylag aircraft import derivatives`: makes airframe and model from the stability derivatives of an aerodynamic
-//! tool.
+//! `greylag aircraft import derivatives`: makes an airframe file and a model file from the stability derivatives that an
+//! aerodynamic tool computed.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -14,7 +14,7 @@ use crate::model::derivatives::{self, Beside};
 /// Unit of deflection of the control derivatives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Angle {
-    /// One degree, as in AVL for a control with a gain of one.
+    /// One degree of deflection, as in AVL for a control with a gain of one.
     Deg,
     /// One radian of deflection.
     Rad,
@@ -23,18 +23,18 @@ enum Angle {
 /// The arguments of `greylag aircraft import derivatives`.
 #[derive(Args)]
 pub struct Derivatives {
-    /// Text of AVL's command ST or SB, XFLR5's log with Sref, Cref and Bref added, or JSON of what OptVL or AeroSandbox
-    /// return in Python.
+    /// Output of the AVL command ST or SB; or an XFLR5 log with Sref, Cref and Bref added; or JSON with the values that
+    /// OptVL or AeroSandbox return in Python.
     file: PathBuf,
-    /// Folder to make, with airframe.toml and model.toml.
+    /// Folder for the new airframe.toml and model.toml.
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
     #[command(flatten)]
     common: Common,
-    /// Metres in the file's unit of length: 0.3048 for feet.
+    /// Unit of length of the file, in metres: 0.3048 for feet.
     #[arg(long, value_name = "M", default_value_t = 1.0)]
     unit_m: f64,
-    /// Unit of deflection of the control derivatives; those of XFLR5 are always per radian.
+    /// Unit of deflection of the control derivatives. Those of XFLR5 are always per radian.
     #[arg(long, value_enum, default_value = "deg")]
     control_unit: Angle,
 }

@@ -1,4 +1,4 @@
-//! `greylag aircraft import jsbsim`: imports a JSBSim aircraft as airframe and model.
+//! `greylag aircraft import jsbsim`: makes an airframe file and a model file from a JSBSim aircraft.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -14,7 +14,7 @@ use crate::control::aircraft_check;
 use crate::model::GreyBox;
 use crate::sim::import::{Imported, import};
 
-/// Upper limit of the accepted cruise airspeeds, m/s.
+/// Cruise airspeeds from this value on are refused, m/s.
 const FASTEST_MPS: f64 = 1000.0;
 
 /// The arguments of `greylag aircraft import jsbsim`.
@@ -22,27 +22,29 @@ const FASTEST_MPS: f64 = 1000.0;
 pub struct Jsbsim {
     /// Folder that holds NAME/NAME.xml.
     dir: PathBuf,
-    /// Name of the aircraft, which is also the name of its file.
+    /// Name of the aircraft; its file must be NAME/NAME.xml.
     name: String,
     /// Folder to make, with airframe.toml and model.toml.
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
-    /// True airspeed about which the derivatives are taken.
+    /// True airspeed at which the aircraft's loads are differentiated.
     #[arg(long, value_name = "MPS")]
     cruise_mps: f64,
-    /// Altitude at which the derivatives are taken, above mean sea level.
+    /// Altitude above mean sea level at which the aircraft's loads are differentiated.
     #[arg(long, value_name = "M", default_value_t = 600.0)]
     altitude_m: f64,
-    /// Name a property of the aircraft (may be repeated), as for `greylag evaluate`; without this option,
-    /// unusual commands and surfaces are found by trying all. NAME may be -NAME*SCALE,NAME,….
+    /// JSBSim property NAME that takes the command KEY or gives the deflection KEY (may be repeated), as for
+    /// `greylag evaluate`. Without this option, properties that differ from the usual ones are found by trying all. NAME may
+    /// be -NAME*SCALE,NAME,….
     #[arg(long, value_name = "KEY=NAME", value_parser = property)]
     property: Vec<(String, String)>,
-    /// Hold a property at a value (may be repeated), for example flaps. The airframe file keeps it.
+    /// Hold a property at a value (may be repeated), for example flaps. The value is stored in the airframe file.
     #[arg(long, value_name = "NAME=VALUE", value_parser = held)]
     set: Vec<(String, f64)>,
 }
 
-/// Imports the aircraft, writes its files and lists the effects that the files do not represent.
+/// Imports the aircraft, writes its files, and lists what the files do not represent. Then prints trim, modes, control
+/// authority and stability margins of the imported aircraft.
 pub fn run(jsbsim: &Jsbsim) -> Result<ExitCode> {
     let (cruise, altitude) = (jsbsim.cruise_mps, jsbsim.altitude_m);
     if !(cruise > 0.0 && cruise < FASTEST_MPS && altitude.is_finite()) {
@@ -87,7 +89,8 @@ pub fn run(jsbsim: &Jsbsim) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Writes the imported files to a temporary folder and reads the model back, before anything is written to the user's folder.
+/// Writes the imported files to a temporary folder and reads the model from there. An import that Greylag cannot read thus
+/// fails before anything is written to the user's folder.
 fn read_back(found: &Imported) -> Result<GreyBox> {
     let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
     let model = folder.path().join("model.toml");

@@ -1,4 +1,4 @@
-//! `greylag aircraft new`: estimates an airframe and a prior model from mass and dimensions.
+//! `greylag aircraft new`: estimates an airframe and an initial model from mass and dimensions.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -13,14 +13,14 @@ use crate::model::plausible::Size;
 use crate::model::textbook::{Measures, Tail};
 use crate::physics::atmosphere::STANDARD_GRAVITY;
 
-/// Smallest upper airspeed limit to which the envelope is reduced, as a multiple of the cruise airspeed.
+/// The upper airspeed limit is reduced only if it stays above this multiple of the cruise airspeed.
 const LEAST_ABOVE_CRUISE: f64 = 1.1;
 /// Default static thrust, as a fraction of the weight.
 const THRUST: f64 = 0.5;
 /// Default pitch speed of the propeller, as a multiple of the airspeed of level flight at a lift coefficient of 0.6.
 const PITCH_SPEED: f64 = 2.0;
 
-/// Surface that trims the aircraft in pitch.
+/// Tail configuration of the aircraft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum TailName {
     /// A tailplane and a fin.
@@ -32,7 +32,7 @@ enum TailName {
 /// Options of `greylag aircraft new`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Folder to make, with airframe.toml and model.toml.
+    /// Folder for airframe.toml and model.toml; created if it does not exist.
     folder: PathBuf,
     /// Wing span.
     #[arg(long, value_name = "M")]
@@ -44,7 +44,7 @@ pub struct Arguments {
     common: Common,
 }
 
-/// Data of an aircraft from which a model can be estimated without flights.
+/// Options that all commands which write a new aircraft have in common.
 #[derive(clap::Args)]
 pub struct Common {
     /// The aircraft's name [default: the folder's].
@@ -53,7 +53,7 @@ pub struct Common {
     /// Mass of the aircraft as flown.
     #[arg(long, value_name = "KG")]
     mass_kg: f64,
-    /// Surface that trims the aircraft in pitch.
+    /// Tail configuration of the aircraft.
     #[arg(long, value_enum, default_value = "conventional")]
     tail: TailName,
     /// The aircraft has no rudder; a flying wing has none anyway.
@@ -62,7 +62,7 @@ pub struct Common {
     /// Deflection of the surfaces at full command, to both sides.
     #[arg(long, value_name = "DEG", default_value_t = 25.0)]
     travel_deg: f64,
-    /// Thrust at rest at full throttle [default: half the weight].
+    /// Static thrust at full throttle [default: half the weight].
     #[arg(long, value_name = "N")]
     static_thrust_n: Option<f64>,
     /// Airspeed at which full throttle gives no thrust: the propeller's pitch times its speed
@@ -71,15 +71,15 @@ pub struct Common {
     pitch_speed_mps: Option<f64>,
 }
 
-/// Writes the files, then prints the estimated flight characteristics.
+/// Writes airframe and model file, then prints the flight characteristics that the model predicts.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let measures =
         measures(&arguments.common, &arguments.folder, arguments.span_m, arguments.area_m2)?;
     write(&arguments.folder, &measures.airframe(), &measures.model())
 }
 
-/// Writes both files into `folder`, then prints the flight characteristics. The exit status is 3 if something needs
-/// correction.
+/// Writes the texts of airframe and model file into `folder`, then prints the flight characteristics that the model
+/// predicts. The exit status is 3 if something needs correction.
 pub fn write(folder: &Path, airframe: &str, model_text: &str) -> Result<ExitCode> {
     let model = files(folder, airframe, model_text)?;
     println!("wrote {} and airframe.toml beside it", model.display());
@@ -92,8 +92,8 @@ pub fn write(folder: &Path, airframe: &str, model_text: &str) -> Result<ExitCode
     Ok(super::check::status(&found))
 }
 
-/// The text of the airframe file with the upper airspeed limit reduced to the fastest level flight. The limit is kept
-/// if the reduced one would be at most 1.1 times the cruise airspeed.
+/// Returns the text of the airframe file. Its upper airspeed limit is reduced to the fastest level flight of the model.
+/// The limit is kept if the reduced one would be at most 1.1 times the cruise airspeed.
 fn flown_level(airframe: &str, model_text: &str) -> Result<String> {
     let scratch = tempfile::tempdir().context("cannot make a temporary folder")?;
     let path = scratch.path().join("model.toml");
@@ -112,7 +112,7 @@ fn flown_level(airframe: &str, model_text: &str) -> Result<String> {
     })
 }
 
-/// Writes airframe and model into `folder`. Returns the path of the model.
+/// Writes airframe and model file into `folder`. Returns the path of the model file.
 pub fn files(folder: &Path, airframe: &str, model_text: &str) -> Result<PathBuf> {
     let airframe = flown_level(airframe, model_text)?;
     std::fs::create_dir_all(folder)

@@ -1,4 +1,4 @@
-//! Bounds of coefficients that a user gives.
+//! Bounds on model coefficients, which a user gives to `greylag amend` as `--bound NAME=LEAST..MOST`.
 
 use anyhow::{Result, bail};
 
@@ -11,7 +11,7 @@ pub struct Bound {
     bounds: [f64; 2],
 }
 
-/// Parses `NAME=LEAST..MOST`.
+/// Parses a bound of the form `NAME=LEAST..MOST`.
 pub fn bound(text: &str) -> Result<Bound, String> {
     let parts =
         text.split_once('=').and_then(|(name, range)| Some((name, range.split_once("..")?)));
@@ -27,10 +27,10 @@ pub fn bound(text: &str) -> Result<Bound, String> {
     }
 }
 
-/// Sets the bounds `all` in `model`.
+/// Returns `model` with the bounds `all` on its coefficients.
 ///
 /// # Errors
-/// If the model has no such coefficient, or the coefficient's value lies outside the bounds.
+/// If the model lacks a coefficient of `all`, or the value of a coefficient lies outside its bounds.
 pub fn given(mut model: GreyBox, all: &[Bound]) -> Result<GreyBox> {
     for Bound { name, bounds: [low, high] } in all {
         let Some(c) = model.coefficients().iter().find(|c| c.name == *name) else {

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use crate::sysid::amend::Added;
 
-/// The fields of the file that are used.
+/// The fields that this module reads from the file.
 #[derive(Deserialize)]
 struct Written {
     schema: String,
@@ -28,8 +28,8 @@ struct Parameter {
     value: Option<f64>,
 }
 
-/// The effects that the diagnosis in `path` asserts for the model named `model`. Their fit starts at the coefficients
-/// of the diagnosis.
+/// The effects that the diagnosis in `path` asserts to be missing in the model named `model`. The diagnosed coefficients are
+/// the starting values of their fit.
 pub fn asserted(path: &Path, model: &str) -> Result<Vec<Added>> {
     let text = std::fs::read_to_string(path)
         .with_context(|| format!("cannot read the diagnosis {}", path.display()))?;

@@ -1,4 +1,5 @@
-//! `greylag amend --leave-one-out`: compares model structures by their errors on flights that were left out of the fit.
+//! `greylag amend --leave-one-out`: compares model structures by cross-validation. Each flight in turn is predicted by a
+//! model that was fitted to all other flights.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -14,12 +15,17 @@ use crate::sysid::amend::{Added, Options};
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::per_flight::{PerFlight, SensorErrors};
 
-/// Default standard deviation of the misalignment of the measured axes, °, for an installation aligned by eye.
+/// Default prior standard deviation of the angles between the sensors' axes and the body axes, °. Sensors that were aligned
+/// by eye have such errors.
 const ASKEW_DEG: f64 = 3.0;
 
-/// The structures to try: the model as given; its coefficients fitted; the same fit with the flights' common sensor errors for
-/// the flight that is left out, with trims of each flight, with a misalignment of each flight's axes, and with both; a fit with physical bounds as the only prior; a fit with each of
-/// `effects`, and with all of them.
+/// The structures to compare:
+/// - the model as given,
+/// - a fit of its coefficients,
+/// - the same fit; the sensor errors common to the fitted flights then also correct the flight left out,
+/// - the same fit with additional constants of each flight: trim coefficients, misalignment angles of the sensor axes, or both,
+/// - a fit in which physical bounds are the only prior,
+/// - a fit with each of `effects` added, and with all of them added, both with the constants of each flight in `asked`.
 pub fn structures(effects: &[Added], asked: PerFlight) -> Vec<Structure> {
     let of = |name: String, effects: &[Added], per_flight: PerFlight| Structure {
         name,
@@ -50,8 +56,8 @@ pub fn structures(effects: &[Added], asked: PerFlight) -> Vec<Structure> {
     all
 }
 
-/// Tries `structures` of `model` on `flights`, prints the table and writes it as JSON to the file `json` if one is
-/// given.
+/// Cross-validates `structures` of `model` on `flights` and prints a table of their errors. Writes the table as JSON to the
+/// file `json` if one is given.
 pub fn run(
     model: &GreyBox,
     flights: &[Reconstruction],

@@ -1,4 +1,6 @@
 //! `greylag amend`: refits a model to flights and adds missing effects.
+//!
+//! An effect is a term of the equations of motion from the catalogue. A diagnosis asserts the effects that it finds missing.
 
 mod bounds;
 mod given;
@@ -46,62 +48,60 @@ pub struct Arguments {
     model: PathBuf,
     #[command(flatten)]
     logs: LogArguments,
-    /// Logs for validation, which the fit does not see [default: the last log, or the last third of a
-    /// single log].
+    /// Logs for validation, which the fit does not see [default: the last log, or the last third of a single log].
     #[arg(long, num_args = 1..)]
     hold_out: Vec<PathBuf>,
-    /// Add the effects that a diagnosis of these logs asserts.
+    /// Diagnose these logs, and add the effects that the diagnosis asserts to be missing.
     #[arg(long, group = "what", conflicts_with = "diagnosis")]
     accept: bool,
-    /// Add the effects that this diagnosis asserts: the JSON of `greylag diagnose`.
+    /// Add the effects that this diagnosis asserts to be missing: a file written by `greylag diagnose --json`.
     #[arg(long, group = "what", value_name = "JSON")]
     diagnosis: Option<PathBuf>,
-    /// Add these effects, in this order: ids of the catalogue, or effect files (TOML); with --accept, after the
-    /// asserted effects.
+    /// Add these effects, in this order: ids of the catalogue, or effect files (TOML). They follow the effects of --accept or
+    /// --diagnosis.
     #[arg(long = "effect", value_name = "ID|FILE", num_args = 1.., group = "what")]
     effects: Vec<String>,
     /// Add nothing: fit the model's own coefficients.
     #[arg(long, group = "what", conflicts_with_all = ["accept", "diagnosis", "effects"])]
     tune_only: bool,
-    /// Also try other conventions (integrator, axes of the forces, the standard atmosphere); adopt
-    /// integrator and axes if the flights support them, the atmosphere unless the flights contradict
-    /// it.
+    /// Also try other model structure options (integrator, axes of the forces, standard atmosphere). The integrator and the axes
+    /// are changed if the flights support it, the atmosphere unless the flights contradict it.
     #[arg(long)]
     conventions: bool,
-    /// Use only physical bounds as prior: all coefficients in which the model is linear are free,
-    /// zeros too. For a model whose numbers are guesses.
+    /// Use only physical bounds as prior: all coefficients in which the model is linear are free, including those that are zero.
+    /// For a model whose numbers are guesses.
     #[arg(long)]
     from_scratch: bool,
     #[command(flatten)]
     per_flight: FitConstantsArguments,
-    /// Bound a coefficient by LEAST and MOST in place of the catalogue's bounds for an aircraft of this
-    /// size, such as lift_linear.CL0=-2..2; the amended model's file records the bounds.
+    /// Bound a coefficient by LEAST and MOST in place of the catalogue's bounds for an aircraft of this size, such as
+    /// lift_linear.CL0=-2..2. The file of the amended model records the bounds.
     #[arg(long = "bound", value_name = "NAME=LEAST..MOST", num_args = 1.., value_parser = bounds::bound)]
     bounds: Vec<bounds::Bound>,
-    /// Write the fit even if it predicts the held-out flights no better, and keep effects that the data refuse.
+    /// Write the fit even if it predicts the held-out flights no better, and add effects that would be refused.
     #[arg(long)]
     accept_anyway: bool,
     /// Fit to all logs: nothing is held out, so the printed errors are those of the fitted flights.
     #[arg(long, conflicts_with = "hold_out")]
     fit_all: bool,
-    /// Write no model: predict each log by a fit to all others, for these structures: the model as given,
-    /// tuned, with trims and axes of each flight, from scratch, and with each effect; report the simplest
-    /// structure within one standard error of the best.
+    /// Write no model. Predict each log by a fit to all other logs, for several model structures: as given, refitted, with
+    /// constants per flight, from scratch, and with each effect added. Report the simplest structure within one standard error
+    /// of the best.
     #[arg(long, conflicts_with_all = ["hold_out", "fit_all", "conventions", "from_scratch", "report", "accept_anyway"])]
     leave_one_out: bool,
-    /// Folder for model.toml, the airframe and amend.json, or for leave-one-out.json; created if
-    /// missing.
+    /// Folder for model.toml, the airframe and amend.json, or for leave-one-out.json; created if missing.
     #[arg(long)]
     out: PathBuf,
-    /// Write the report, one HTML page.
+    /// Write the report as one HTML page.
     #[arg(long)]
     report: Option<PathBuf>,
-    /// Replace files that exist.
+    /// Replace files that already exist.
     #[arg(long)]
     force: bool,
 }
 
-/// Reads and reconstructs the flights and fits the model. Prints the errors before and after, and writes the model.
+/// Reads the logs, reconstructs the flight paths and fits the model. Prints the prediction errors before and after the fit, and
+/// writes the model.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let path = shipped(&arguments.model);
     let overwrite = arguments.force.into();
@@ -131,7 +131,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     in_doubt |= doubtful(story);
     let all_refused = story.all_refused();
     let kept = given_is_kept(arguments, story).filter(|_| !all_refused);
-    // the page is drawn before anything is written; Ctrl-C then leaves no file behind
+    // the page is drawn before any file is written, so that Ctrl-C during the drawing leaves no file behind
     let draw = || page(arguments, &model, &amended, &tests, &places, &part(&on_stage, drawing));
     let drawn = match &arguments.report {
         Some(path) if !all_refused && kept.is_none() => Some((path, draw()?)),
@@ -162,7 +162,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 impl Arguments {
-    /// Checks that no log is named twice and, if flights have constants of their own, that all file names differ.
+    /// Checks that no log is named twice and, if constants are estimated per flight, that all file names differ.
     fn check_logs(&self) -> Result<()> {
         distinct(&self.logs.paths, &self.hold_out)?;
         match self.per_flight.asked().constants().is_empty() {
@@ -172,9 +172,9 @@ impl Arguments {
     }
 }
 
-/// The reason why the fit is not written, in a sentence; `None` if it is written. With `--fit-all` no flight is held
-/// out, so an improvement by chance cannot be detected. With `--from-scratch` the model as given is a guess: it is kept
-/// only if a comparison favours it.
+/// The reason why the fit is not written, in a sentence; `None` if it is written. With `--fit-all` no flight is held out, so an
+/// improvement by chance cannot be detected. With `--from-scratch` the model as given is a guess, so flights that are too short
+/// to exclude an improvement by chance are no reason to keep it.
 fn given_is_kept(arguments: &Arguments, story: &Amendment) -> Option<String> {
     let by_chance = || story.by_chance().filter(|_| !arguments.fit_all);
     let unjudged = || story.unjudged().filter(|_| !arguments.fit_all && !arguments.from_scratch);
@@ -187,7 +187,7 @@ fn next(arguments: &Arguments, places: &Places) -> String {
     format!("greylag diagnose --model {}{}", quoted(&places.model()), logs.words())
 }
 
-/// Options of the amendment, with `effects` to be added.
+/// Options of the amendment. `effects` are the effects to add.
 fn options(arguments: &Arguments, effects: Vec<Added>) -> amend::Options {
     amend::Options {
         effects,
@@ -209,7 +209,7 @@ fn doubtful(story: &Amendment) -> bool {
 /// Carries out `--leave-one-out`: prints a table of structures and writes no model.
 fn structures(arguments: &Arguments, model: &GreyBox) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
-    // the fit would see a copy of the flight that is left out
+    // with a log given twice, the fit would see a copy of the flight that is left out
     distinct(&arguments.logs.paths, &[])?;
     std::fs::create_dir_all(&arguments.out)
         .with_context(|| format!("cannot make the folder {}", arguments.out.display()))?;
@@ -243,8 +243,8 @@ fn check_new(effects: &[String], model: &GreyBox) -> Result<()> {
     Ok(())
 }
 
-/// The flights for validation: the held-out flights. If none is held out, the only flight in `taken` is split: its last
-/// third is returned, and `taken` keeps the first two thirds. With `--fit-all`, all flights are returned.
+/// The flights for validation: those of the files `held`. If `held` is empty, the first flight in `taken` is split: its last
+/// third is returned, and `taken` keeps the first two thirds. With `--fit-all`, the fitted flights are returned.
 fn tests(
     arguments: &Arguments,
     held: Vec<PathBuf>,
@@ -272,7 +272,7 @@ fn tests(
     Ok(more.flights)
 }
 
-/// The report as HTML, with the growth of the errors on the validation flights.
+/// The report as HTML, with the errors of open-loop simulations of the validation flights over the simulated time.
 fn page(
     arguments: &Arguments,
     model: &GreyBox,
@@ -302,8 +302,8 @@ fn page(
     Ok(report.page().render())
 }
 
-/// Logs for the fit and logs for validation. If none is held out, the last log is for validation. A single log is only
-/// for the fit. With `--fit-all` all logs are for both.
+/// Logs for the fit and logs for validation. If none is held out, the last log is for validation. A single log is only for the
+/// fit. With `--fit-all` all logs are for both.
 fn divided(arguments: &Arguments) -> (Vec<PathBuf>, Vec<PathBuf>) {
     let logs = &arguments.logs.paths;
     if arguments.fit_all {
@@ -316,8 +316,8 @@ fn divided(arguments: &Arguments) -> (Vec<PathBuf>, Vec<PathBuf>) {
     }
 }
 
-/// Error message if the diagnosis of the fitted flights asserts no effect. The message has the verdict of the diagnosis
-/// and the commands to run next.
+/// Error message if the diagnosis of the fitted flights asserts no effect. It states the verdict of the diagnosis and the
+/// commands to run next.
 fn nothing_asserted(
     arguments: &Arguments,
     diagnosis: &Diagnosis,
@@ -340,7 +340,7 @@ fn nothing_asserted(
     )
 }
 
-/// The effects to add: those asserted by a diagnosis, then those named by options.
+/// The effects to add: those asserted by a diagnosis, then those named by `--effect`.
 fn wanted(
     arguments: &Arguments,
     effects: &[String],

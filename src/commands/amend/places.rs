@@ -1,4 +1,5 @@
-//! Files that `greylag amend` reads and writes: the model, its airframe, the results.
+//! Files of `greylag amend`, which refits a model with added effects: its inputs, and the folder with the amended model and
+//! the results.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,7 +11,7 @@ use crate::model::GreyBox;
 use crate::sysid::amend::Amended;
 use crate::sysid::amend::document::{self, Hashed, MODEL, Original, STORY, differs};
 
-/// The logs with their hashes.
+/// Reads the logs at `paths` and computes their hashes.
 pub fn hashed(paths: &[PathBuf]) -> Result<Vec<Hashed>> {
     let one = |path: &PathBuf| {
         let content = fs::read(path).with_context(|| {
@@ -21,7 +22,7 @@ pub fn hashed(paths: &[PathBuf]) -> Result<Vec<Hashed>> {
     paths.iter().map(one).collect()
 }
 
-/// Paths of the inputs and outputs.
+/// The files of the original model, and the folder for the results.
 pub struct Places {
     original: Original,
     folder: PathBuf,
@@ -40,8 +41,8 @@ impl Drop for Places {
 }
 
 impl Places {
-    /// Reads the model file `original` of `model` and makes the folder. Fails at once if a result could not be
-    /// written after the fit.
+    /// Reads the file `original`, from which `model` was loaded, and makes `folder`. It fails now, before the fit, if the
+    /// results could not be written after the fit.
     pub fn new(
         original: &Path,
         model: &GreyBox,
@@ -49,7 +50,7 @@ impl Places {
         overwrite: Overwrite,
     ) -> Result<Places> {
         if model.residual.is_some() {
-            // the written model would lack the residual's file
+            // the file of the residual is not copied, so the written model would lack it
             bail!(
                 "model {} has a learned residual, which amend does not write: amend its prior, then learn the residual \
                  again",
@@ -79,7 +80,8 @@ impl Places {
         self.folder.join(MODEL)
     }
 
-    /// Writes the model and the results, and checks that the model read back from its file has the same numbers to the bit.
+    /// Writes the amended model and the results. Then reads the model back and checks that its numbers are the same to the
+    /// bit.
     pub fn write(
         &self,
         before: &GreyBox,
@@ -89,7 +91,7 @@ impl Places {
     ) -> Result<()> {
         for (name, text) in document::files(&self.original, before, amended, logs)? {
             let path = self.folder.join(name);
-            // airframe and effects may exist already if a model is amended again
+            // the files of airframe and effects may exist already if an amended model is amended again
             if !holds(&path, &text) {
                 files::write(&path, &text, overwrite)?;
             }
@@ -104,7 +106,7 @@ impl Places {
     }
 }
 
-/// Whether the file at `path` exists with this text.
+/// Whether the file at `path` has exactly the content `text`.
 fn holds(path: &Path, text: &str) -> bool {
     fs::read_to_string(path).is_ok_and(|there| there == text)
 }

@@ -1,4 +1,5 @@
-//! Output of `greylag amend` on the terminal.
+//! Output of `greylag amend` on the terminal. The command re-estimates a model's coefficients from flights, adds effects that
+//! the model lacks, and computes the error on held-out flights, which were not used for the estimation.
 
 use comfy_table::Table;
 
@@ -6,7 +7,8 @@ use crate::commands::terminal::{NORMAL_95, print_answer, table, whole_names};
 use crate::sysid::amend::{Amendment, FittedFlight, Parameter};
 use crate::sysid::compare::{Answer, HorizonScore};
 
-/// Prints the answer, then errors, parameters, sentences and notes.
+/// Prints the answer (the reduction of the error in a few lines), then tables of errors and estimates, then the findings in
+/// sentences, then notes.
 pub fn print(story: &Amendment, answer: &Answer) {
     print_answer(answer);
     println!("{}\n{}", error_table(story), whole_names(parameter_table(&story.parameters)));
@@ -34,7 +36,7 @@ fn parameter_table(parameters: &[Parameter]) -> Table {
     table
 }
 
-/// Constants estimated for each flight; angles in degrees.
+/// Table of the constants that were estimated for each flight separately. Angles are in degrees.
 fn own_table(flights: &[FittedFlight]) -> Table {
     let mut table =
         table(["flight", "its own", "value", "± 95 %", "minus the flights' mean", "± 95 %"], 1);
@@ -51,7 +53,7 @@ fn own_table(flights: &[FittedFlight]) -> Table {
     table
 }
 
-/// Factor to the display unit of a constant of a flight, and this unit.
+/// The factor that converts the constant `name` to its display unit, and this unit.
 fn own_unit(name: &str) -> (f64, &'static str) {
     match name {
         name if name.starts_with("askew") => (1f64.to_degrees(), "°"),
@@ -60,7 +62,8 @@ fn own_unit(name: &str) -> (f64, &'static str) {
     }
 }
 
-/// Errors of free runs (open-loop simulations) on the validation flights.
+/// Table of the NRMSE of open-loop simulations ("free runs") on the held-out flights, for the model as given, re-estimated
+/// ("tuned"), and with the added effects ("amended"). Columns are the lengths of the simulations, s.
 fn error_table(story: &Amendment) -> Table {
     let header = ["NRMSE on held-out flights", "1 s", "2 s", "5 s", "10 s", "diverged"];
     let mut table = table(header, 1);

@@ -1,5 +1,7 @@
-//! Cost of the cells of a campaign. The cost is measured on cells of the same stage. Without a measurement it is the
-//! figure in the campaign file.
+//! Processor time that a cell of a campaign costs. A cell is one run of this program; a stage is a group of cells with the same
+//! command at other settings.
+//!
+//! The cost is the median over the finished cells of the stage. If none has finished, it is the figure in the campaign file.
 
 use anyhow::Result;
 
@@ -7,10 +9,10 @@ use crate::campaign::file::StageFile;
 use crate::campaign::{Plan, Store};
 use crate::num::statistics::quantile;
 
-/// Cost of a cell of a stage.
+/// Cost of one cell of a stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cost {
-    /// Processor time, s.
+    /// Processor time over all cores, s.
     pub core_seconds: f64,
     /// Source of the figure.
     pub from: Source,
@@ -19,15 +21,15 @@ pub struct Cost {
 /// Source of a cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// The median of this many cells.
+    /// The median over this many finished cells.
     Measured(usize),
     /// The figure in the campaign file.
     Stated,
 }
 
 impl Cost {
-    /// Cost of a cell of `stage`; `None` if it is unknown. Resumed cells are not counted, because their time covers the
-    /// last session only.
+    /// Cost of one cell of `stage`; `None` if it is unknown. Cells that were interrupted and resumed are left out, because
+    /// only the time of their last session is recorded.
     ///
     /// # Errors
     /// If the times of a cell cannot be read.
@@ -54,7 +56,7 @@ impl std::fmt::Display for Source {
     }
 }
 
-/// Formats `seconds` (s) in s, min or h.
+/// Formats a duration, given in seconds, as s, min or h.
 pub fn time(seconds: f64) -> String {
     match seconds {
         s if s < 99.5 => format!("{s:.0} s"),

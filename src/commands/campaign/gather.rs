@@ -1,4 +1,5 @@
-//! `greylag campaign gather`: joins the results and lists the missing cells.
+//! `greylag campaign gather`: collects the results of a campaign and lists its cells without a result. A cell is one command
+//! line of the campaign, for example one training with one seed.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -18,14 +19,14 @@ const NAMED: usize = 20;
 pub struct Arguments {
     #[command(flatten)]
     which: Which,
-    /// Write the results as JSON lines: the same cells give the same file to the bit.
+    /// Write the results as JSON lines. Equal results give identical files.
     #[arg(long, value_name = "FILE.jsonl")]
     results: Option<PathBuf>,
-    /// Write the duration, date and processor of each cell.
+    /// Write the duration, date and processor of each finished cell as JSON lines.
     #[arg(long, value_name = "FILE.jsonl")]
     times: Option<PathBuf>,
-    /// Files that `--results` wrote on other machines; their results are taken for the cells that
-    /// are not done here.
+    /// Files that `--results` wrote on other machines. Their results are used for the cells that
+    /// have no result here.
     #[arg(long, value_name = "FILE.jsonl", num_args = 1..)]
     join: Vec<PathBuf>,
     /// Replace the files if they exist.
@@ -33,7 +34,7 @@ pub struct Arguments {
     force: bool,
 }
 
-/// Joins the results and prints the cells that are not done.
+/// Collects the results and prints the cells that are not done.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite: Overwrite = arguments.force.into();
     for path in arguments.results.iter().chain(&arguments.times) {
@@ -65,7 +66,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if all.is_whole() { ExitCode::SUCCESS } else { ExitCode::from(IN_DOUBT) })
 }
 
-/// Prints how the results of a file were joined.
+/// Prints how many results of the file `path` were used, and why others were not.
 fn print_joined(path: &Path, joined: &Joined) {
     let path = path.display();
     println!("{} results taken from {path}", joined.taken);

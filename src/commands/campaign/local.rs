@@ -1,4 +1,4 @@
-//! Runs all cells of a campaign on this machine, each in a separate process, as a scheduler does.
+//! Runs all cells of a campaign on this machine, each in a separate process. A cell is one command line of the campaign.
 
 use std::collections::BTreeMap;
 use std::fs::OpenOptions;
@@ -19,14 +19,14 @@ use crate::sysid::progress::Stage;
 const LOOK: Duration = Duration::from_millis(50);
 /// Pause before another attempt at a cell.
 const PAUSE: Duration = Duration::from_secs(2);
-/// Time within which a process must end at its checkpoint after Ctrl-C.
+/// After Ctrl-C a process has this time to write its checkpoint and end. Then it is killed.
 const GRACE: Duration = Duration::from_secs(20);
-/// Largest number of starts of a cell whose process was ended by a signal, for example for lack of memory.
+/// A cell fails if a signal has ended its process this many times, for example for lack of memory.
 const KILLS: u32 = 3;
-/// Folder of the cells' output text, below the campaign's folder.
+/// Subfolder of the campaign's folder with the text that the cells print.
 const LOGS: &str = "logs";
 
-/// Treatment of cells that failed before.
+/// Treatment of cells that failed in an earlier run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failed {
     /// Failed cells are left as they are.
@@ -44,7 +44,7 @@ enum State {
     Failed,
 }
 
-/// A run of all cells.
+/// A run of all cells of a campaign, at most `jobs` at a time.
 struct Local<'a> {
     plan: &'a Plan,
     store: &'a Store,
@@ -55,7 +55,7 @@ struct Local<'a> {
     bar: Bar,
 }
 
-/// Runs all cells that are not done.
+/// Runs all cells that have no result, at most `jobs` at a time. Prints the final state of the cells.
 pub fn run(
     plan: &Plan,
     store: &Store,
@@ -130,7 +130,7 @@ impl Local<'_> {
         }
     }
 
-    /// Index of the first waiting cell that can be started now. `None` if there is none.
+    /// Index of the first waiting cell that can be started now: its pause is over, and the cells that it depends on are done.
     fn next(&self, now: Instant) -> Option<usize> {
         let ready = |i: &usize| {
             let State::Waiting { not_before, .. } = self.states[*i] else { return false };
@@ -139,7 +139,7 @@ impl Local<'_> {
         (0..self.states.len()).find(ready)
     }
 
-    /// Whether any waiting cell can still be run: no cell on which it depends has failed.
+    /// Whether a waiting cell remains that can still be run, because no cell on which it depends has failed.
     fn is_waiting(&self) -> bool {
         let waits = |i: &usize| matches!(self.states[*i], State::Waiting { .. });
         (0..self.states.len()).filter(waits).any(|i| self.may_come(i))
@@ -166,7 +166,7 @@ impl Local<'_> {
             .arg(self.file)
             .arg("--out")
             .arg(self.store.folder())
-            // The cell is named by id, because its number changes if the campaign file is edited during the run.
+            // The cell is named by its id, because its number may change if the user edits the campaign file during the run.
             .args(["--cell", &cell.id])
             .env("RAYON_NUM_THREADS", (cores / self.jobs).max(1).to_string())
             .stdin(Stdio::null())
@@ -180,7 +180,7 @@ impl Local<'_> {
         Ok(())
     }
 
-    /// Collects the processes that have ended.
+    /// Finds the processes that have ended, and updates and prints the states of their cells.
     fn reap(&mut self) -> Result<()> {
         let mut ended = Vec::new();
         for (index, child) in &mut self.running {
@@ -224,7 +224,7 @@ impl Local<'_> {
         Ok(())
     }
 
-    /// At most three metrics of a result, from those in the campaign's tables.
+    /// Text with at most three quantities of a result. They are quantities that the campaign's tables summarise.
     fn reached(&self, record: &Record) -> String {
         let file = &self.plan.file;
         let of = |choice: &str| {
@@ -241,8 +241,8 @@ impl Local<'_> {
         self.states.iter().filter(|s| **s == state).count()
     }
 
-    /// Processor time of all cells, and remaining time of this run with its parallel jobs, s. `None` if the cost of a
-    /// stage is unknown.
+    /// Two estimates, s: the processor time of all cells, and the remaining time of this run. The latter is the processor
+    /// time of the cells that have not ended, divided by the number of jobs. `None` if the cost of a stage is unknown.
     fn left(&self) -> Result<Option<[f64; 2]>> {
         let (mut all, mut left) = (0.0, 0.0);
         for stage in &self.plan.file.stages {
@@ -267,7 +267,7 @@ impl Local<'_> {
         Ok(self.bar.update(Stage::new(&doing, done)).is_break())
     }
 
-    /// Waits for the processes to end at their checkpoints, and kills those that do not end in time.
+    /// Waits until the processes have written their checkpoints and ended. Kills those that have not ended after [`GRACE`].
     fn end(&mut self) {
         let begun = Instant::now();
         while !self.running.is_empty() && begun.elapsed() < GRACE {

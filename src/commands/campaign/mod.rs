@@ -1,4 +1,4 @@
-//! `greylag campaign`: plans, runs, joins and reports many runs over priors, controllers and seeds.
+//! `greylag campaign`: plans, runs, gathers and reports many runs over prior models, controllers and seeds.
 
 mod cost;
 mod gather;
@@ -32,21 +32,21 @@ pub struct Arguments {
 enum What {
     /// Show the cells of a campaign, their costs and their outputs.
     Plan(plan::Arguments),
-    /// Run cells: all on this machine, a single one, or all through a scheduler.
+    /// Run cells: all on this machine, a single one, or all through a cluster's scheduler.
     Run(run::Arguments),
-    /// Join the results, and list the cells that are missing.
+    /// Gather the results of the cells, and list the cells without a result.
     Gather(gather::Arguments),
-    /// Write the tables and the page.
+    /// Write the tables and the HTML page of the results.
     Report(report::Arguments),
 }
 
-/// Campaign and folder that a subcommand works on.
+/// Campaign and results folder that a subcommand works on.
 #[derive(clap::Args)]
 struct Which {
     /// File that defines the campaign.
     #[arg(value_name = "FILE.toml")]
     file: PathBuf,
-    /// Folder of its cells [default: campaign-NAME].
+    /// Folder for the cells' results [default: campaign-NAME].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 impl Which {
-    /// Opens the campaign and the folder of its results, and checks the commands of its cells.
+    /// Reads the campaign file, opens the folder of results, and checks the commands of the cells.
     fn open(&self) -> Result<(Plan, Store)> {
         let path = shipped(&self.file);
         let plan = campaign::plan(CampaignFile::load(&path)?, &path, &shipped)?;

@@ -1,4 +1,5 @@
-//! `greylag campaign run --cell`: runs one cell in this process.
+//! `greylag campaign run --cell`: runs one cell in this process. A cell is a command line of a campaign, run at one
+//! combination of settings. Its results are written to a folder of its own.
 
 use std::ffi::OsString;
 use std::io::ErrorKind;
@@ -14,15 +15,15 @@ use crate::campaign::{Cell, Plan, Record, Standing, Store};
 use crate::commands::interruption::{Ended, Interruption};
 use crate::commands::{self, VERSION, one_line, status};
 
-/// Subcommands that a cell may run, whether this program has them, and the feature that they need.
+/// Subcommands that a cell may run: the name, whether this build of the program has it, and the feature that it needs.
 const KNOWN: [(&str, bool, &str); 3] = [
     ("collect", cfg!(feature = "demo"), "sitl"),
     ("evaluate", cfg!(feature = "demo"), "sitl"),
     ("train", cfg!(feature = "learn"), "learn"),
 ];
 
-/// Fails if the command of a stage cannot be a cell. A command that needs another build is reported only when the cell
-/// is run.
+/// Fails if the command line of a cell does not begin with a subcommand that a cell may run, or if its arguments are invalid.
+/// The arguments of a subcommand that this build lacks are not checked; `run` then reports the missing feature.
 pub fn check(plan: &Plan, store: &Store, path: &Path) -> Result<()> {
     for cell in &plan.cells {
         let about = || format!("campaign file {}: stage {}", path.display(), cell.stage);
@@ -45,7 +46,7 @@ fn line(cell: &Cell, folder: &Path) -> Vec<OsString> {
     cell.words_in(folder).into_iter().map(OsString::from).collect()
 }
 
-/// Runs a cell, unless it is done. The exit status shows whether a later attempt may succeed.
+/// Runs a cell, unless it is done. The exit status is `TRY_AGAIN` if a later attempt may succeed.
 pub fn run(plan: &Plan, store: &Store, cell: &Cell) -> Result<ExitCode> {
     let id = &cell.id;
     if let Standing::Done(_) = store.standing(cell)? {
@@ -145,9 +146,9 @@ fn times(cell: &Cell, claimed: &Claimed, seconds: f64) -> Times {
     }
 }
 
-/// Processor time of all threads of this process, s, from Linux's /proc.
+/// Processor time of all threads of this process, s, from /proc. `None` on systems other than Linux.
 fn core_seconds() -> Option<f64> {
-    /// Ticks per second of the times in /proc.
+    /// Number of ticks per second. The times in /proc are in ticks.
     const TICKS: f64 = 100.0;
     let text = std::fs::read_to_string("/proc/self/stat").ok()?;
     // the second field is a name in parentheses, which may hold spaces
@@ -162,7 +163,7 @@ fn processor() -> String {
     name.map_or(std::env::consts::ARCH.into(), |(_, name)| name.trim().to_owned())
 }
 
-/// Whether the cause of the error is temporary, for example a full disk.
+/// Whether a cause of the error is temporary, such as a full disk, so that a later attempt may succeed.
 fn is_temporary(error: &anyhow::Error) -> bool {
     use ErrorKind::{
         Interrupted, OutOfMemory, QuotaExceeded, ResourceBusy, StaleNetworkFileHandle, StorageFull,

@@ -1,4 +1,5 @@
-//! `greylag campaign plan`: shows the cells of a campaign and their cost.
+//! `greylag campaign plan`: shows the cells of a campaign and their cost. A cell is the command of a stage with one
+//! combination of parameters, such as prior, controller and seed.
 
 use std::process::ExitCode;
 
@@ -19,7 +20,7 @@ pub struct Arguments {
     cells: bool,
 }
 
-/// Prints the stages with their costs.
+/// Prints the campaign's stages with their costs, and with `--cells` every cell.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let (plan, store) = arguments.which.open()?;
     println!("campaign {}: {}", plan.file.name, plan.file.about);
@@ -37,7 +38,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Prints a table of the stages, and the total cost.
+/// Prints a table of the stages, and the total cost of the cells that are not done.
 fn print_costs(plan: &Plan, store: &Store) -> Result<()> {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
@@ -94,7 +95,7 @@ fn done(plan: &Plan, store: &Store, stage: &str) -> Result<usize> {
     Ok(done)
 }
 
-/// Output of a command that later stages read.
+/// What `command` writes into the folder of its cell, in words.
 fn written(command: &str) -> &'static str {
     let words: Vec<&str> = command.split_whitespace().take(2).collect();
     match words[..] {

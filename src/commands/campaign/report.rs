@@ -1,4 +1,5 @@
-//! `greylag campaign report`: writes the tables and the page of a campaign.
+//! `greylag campaign report`: summarises the results of a campaign in tables and on a page. The runs of a campaign are
+//! called cells.
 
 use std::collections::{BTreeSet, HashSet};
 use std::path::PathBuf;
@@ -23,7 +24,7 @@ pub struct Arguments {
     /// Take the results from a file that `greylag campaign gather` wrote, not from the cells' folders.
     #[arg(long, value_name = "FILE.jsonl")]
     results: Option<PathBuf>,
-    /// Write the tables and curves as a page.
+    /// Write the tables and curves as an HTML page.
     #[arg(long, value_name = "OUT.html")]
     report: Option<PathBuf>,
     /// Write the tables as Markdown.
@@ -34,7 +35,7 @@ pub struct Arguments {
     force: bool,
 }
 
-/// Prints the tables, and writes tables and page.
+/// Prints the tables, and writes the files that the options request. The exit status is 3 if a cell has no result.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite: Overwrite = arguments.force.into();
     for path in arguments.report.iter().chain(&arguments.tables) {
@@ -77,7 +78,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 impl Arguments {
-    /// The results of the plan's cells. Results of other cells are dropped, with a note.
+    /// Returns the results of the plan's cells. Prints how many cells have no result, and how many results of the file belong
+    /// to no cell.
     fn records(&self, plan: &Plan, store: &Store) -> Result<Vec<Record>> {
         let Some(path) = &self.results else {
             let all = gather(plan, store)?;
@@ -86,7 +88,7 @@ impl Arguments {
         };
         let mut records = read_lines(path)?;
         let all = records.len();
-        // cells with the same command have the same identity, so the cell's name is compared too
+        // cells with the same command and inputs have the same identity, so the cell's name is compared too
         let planned: HashSet<(&str, &str)> =
             plan.cells.iter().map(|c| (c.id.as_str(), c.identity.as_str())).collect();
         records.retain(|r| planned.contains(&(r.cell.as_str(), r.identity.as_str())));
@@ -107,7 +109,7 @@ impl Arguments {
     }
 }
 
-/// Tables and findings as text.
+/// The tables as text, and whether the results support the claims that the campaign file states.
 fn text(summaries: &[Summary], findings: &[Finding], preset: comfy_table::TableStyle) -> String {
     let mut text = String::new();
     for summary in summaries {

@@ -1,4 +1,7 @@
-//! `greylag campaign run`: runs all cells on this machine or one cell, or prints the script of a scheduler.
+//! `greylag campaign run`: runs the cells of a campaign. A campaign is a set of runs over models, controllers and seeds. A cell
+//! is one of these runs.
+//!
+//! The command runs all cells on this machine, runs one cell, or writes the script that submits all cells to a scheduler.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -23,10 +26,10 @@ pub struct Arguments {
     /// Number of cells to run in parallel [default: the number of cores].
     #[arg(long, value_name = "N", requires = "local", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
-    /// Try again the cells that failed for good.
+    /// Run the cells again that failed permanently in an earlier run.
     #[arg(long, requires = "local")]
     failed: bool,
-    /// Run one cell, given by its number or id; exit status 75: a later attempt may succeed, 1: it failed for good.
+    /// Run one cell, given by its number or id; exit status 75: another attempt may succeed, 1: it failed permanently.
     #[arg(long, value_name = "ID")]
     cell: Option<String>,
     /// Print the script that submits the cells to a scheduler.
@@ -53,14 +56,14 @@ enum Launch {
     Slurm,
     /// Task arrays of HyperQueue.
     Hyperqueue,
-    /// One machine by GNU parallel.
+    /// GNU parallel on one machine.
     Parallel,
 }
 
-/// Number of attempts at a cell whose exit status allows a later attempt.
+/// Largest number of attempts at a cell. Another attempt is made only if the cell was killed or ended with exit status 75.
 const ATTEMPTS: usize = 20;
 
-/// Runs the chosen cells, or prints or submits the script.
+/// Runs the chosen cells, or prints or executes the script.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let (plan, store) = arguments.which.open()?;
     if let Some(name) = &arguments.cell {
@@ -77,14 +80,14 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 impl Arguments {
-    /// Prints the script, or submits it by running it.
+    /// Prints the script for the scheduler, or executes it with `--submit`.
     fn launch(&self, launcher: Launch, plan: &Plan, store: &Store) -> Result<ExitCode> {
         let launcher = match launcher {
             Launch::Slurm => Launcher::Slurm,
             Launch::Hyperqueue => Launcher::Hyperqueue,
             Launch::Parallel => Launcher::Parallel,
         };
-        // a job starts in another folder, so all paths are absolute
+        // paths are absolute because a job may start in another folder
         let job = Job {
             program: absolute(&std::env::current_exe().context("finding this program")?)?,
             file: absolute(&shipped(&self.which.file))?,

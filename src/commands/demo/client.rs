@@ -1,4 +1,5 @@
-//! The client of the demonstration. It arms, enters offboard mode and flies the schedule over a real socket.
+//! The client of the demonstration. It sends MAVLink commands to the companion, the program that flies the aircraft: it
+//! arms, enters offboard mode and commands the attitudes of a schedule over a UDP socket.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,7 +11,7 @@ use super::schedule::{Leg, Legs};
 use crate::link::autopilot::Mode;
 use crate::link::offboard::{ARM, Heard, OffboardClient, SET_MODE};
 
-/// Timeout of arming, of entering offboard and of every other request.
+/// Time within which the companion must fulfil a request.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
 /// Interval between setpoints (50 Hz).
 const SETPOINT_PERIOD: Duration = Duration::from_millis(20);
@@ -46,7 +47,7 @@ pub struct Client {
 }
 
 impl Client {
-    /// Opens a socket towards the companion's client link.
+    /// Opens a UDP socket to the companion's address for clients.
     pub fn connect(companion: SocketAddr) -> Result<Client> {
         let open = || -> std::io::Result<UdpSocket> {
             let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
@@ -67,9 +68,9 @@ impl Client {
         })
     }
 
-    /// Arms, enters offboard mode, flies every leg, and enters hold mode. `watch` receives the index of the leg, the time
-    /// on the leg (s) and the view. If `ended` becomes true, the remaining legs are skipped. Returns the companion's texts
-    /// with their times, s.
+    /// Arms, enters offboard mode, commands the attitude of each leg, and enters hold mode. `watch` receives the index of
+    /// the leg, the time since its start (s) and the view. If `ended` becomes true, the rest of the schedule is skipped.
+    /// Returns the companion's texts with their times, s.
     pub fn fly(
         &mut self,
         legs: &Legs,
@@ -168,7 +169,7 @@ impl Client {
     }
 
     fn send(&self, bytes: &[u8]) {
-        // a lost datagram is not retried: every message is sent periodically
+        // a failed send is not retried: every message is sent periodically
         let _ = self.socket.send(bytes);
     }
 

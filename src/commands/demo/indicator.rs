@@ -1,12 +1,12 @@
-//! An attitude indicator in text characters: the horizon as seen from the aircraft.
+//! An attitude indicator made of text characters. It shows the horizon as seen from the aircraft.
 
-/// Rows of the indicator, an odd number.
+/// Number of rows of the indicator; odd, so that one row is the middle.
 pub const ROWS: usize = 9;
-/// Columns of the indicator, an odd number.
+/// Number of columns of the indicator; odd, so that one column is the middle.
 const COLUMNS: usize = 27;
-/// Pitch angle per row, degrees.
+/// Pitch angle that one row represents, degrees.
 const DEGREES_A_ROW: f64 = 10.0;
-/// Ratio of height to width of a character.
+/// Ratio of the height of a character to its width.
 const ASPECT: f64 = 2.0;
 
 /// The rows of characters for an attitude in degrees. `░` is the ground, and the aircraft symbol stays in the middle.
@@ -14,7 +14,7 @@ pub fn rows(roll_deg: f64, pitch_deg: f64) -> [String; ROWS] {
     let (sin, cos) = roll_deg.to_radians().sin_cos();
     let middle = |n: usize| (n / 2) as f64;
     std::array::from_fn(|row| {
-        // distances to the right of and below the middle, in rows
+        // `down` and `right` are the distances below and to the right of the middle, in heights of a row
         let down = row as f64 - middle(ROWS);
         let cell = |column: usize| {
             let right = (column as f64 - middle(COLUMNS)) / ASPECT;

@@ -1,4 +1,5 @@
-//! Output of the demonstration in flight: one line per target, and on a terminal an attitude indicator.
+//! Output of the demonstration in flight: one line per target attitude, and on a terminal an attitude indicator. The part of
+//! the flight with one target is a leg.
 
 use std::io::{IsTerminal, Write};
 use std::time::Duration;
@@ -9,7 +10,7 @@ use super::schedule::{Leg, Legs};
 
 /// Interval between two drawings.
 const EVERY: Duration = Duration::from_millis(100);
-/// Width of the bar that shows the flown part of a leg, characters.
+/// Width of the bar that shows the elapsed part of a leg, characters.
 const BAR: usize = 24;
 
 /// Prints one line per leg when the leg ends. A terminal also shows the attitude during the leg.
@@ -24,7 +25,7 @@ pub struct Live<'a> {
 }
 
 impl Live<'_> {
-    /// Prints the header of the lines.
+    /// Prints the column titles of the lines.
     pub fn begin(legs: &Legs) -> Live<'_> {
         println!("   target roll/pitch     roll    pitch   error   airspeed  altitude");
         let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
@@ -55,7 +56,7 @@ impl Live<'_> {
         }
     }
 
-    /// Writes the line of the leg that has ended.
+    /// Ends the present leg: erases the drawing and prints the last line of the leg.
     pub fn end(&mut self) {
         if self.leg.take().is_some() {
             self.wipe();
@@ -67,7 +68,7 @@ impl Live<'_> {
         self.wipe();
         rows.iter().for_each(|row| println!("{row}"));
         self.drawn = rows.len();
-        // an error of the terminal must not end the flight
+        // a failed flush must not end the flight
         let _ = std::io::stdout().flush();
     }
 
@@ -80,7 +81,7 @@ impl Live<'_> {
     }
 }
 
-/// Mean of the errors of roll and pitch, degrees.
+/// Mean of the magnitudes of the roll error and the pitch error, degrees.
 fn error_deg(target: &Leg, view: &View) -> f64 {
     let (roll, pitch) = (view.roll.to_degrees(), view.pitch.to_degrees());
     0.5 * ((roll - target.roll_deg).abs() + (pitch - target.pitch_deg).abs())
@@ -100,7 +101,7 @@ fn line(seconds: f64, target: &Leg, view: &View) -> String {
     )
 }
 
-/// The rows of the attitude indicator, with numbers to the right.
+/// The rows of the attitude indicator, with numbers to the right. `flown` is the elapsed fraction of the leg.
 fn block(what: &str, flown: f64, target: &Leg, view: &View) -> Vec<String> {
     let (roll, pitch) = (view.roll.to_degrees(), view.pitch.to_degrees());
     let done = (flown.clamp(0.0, 1.0) * BAR as f64).round() as usize;

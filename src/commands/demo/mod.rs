@@ -1,5 +1,7 @@
-//! `greylag demo`: runs the simulator with its MAVLink side (the shim), the companion and a client in one program, over
-//! real sockets.
+//! `greylag demo`: a demonstration flight in one program.
+//!
+//! Three parts communicate over real sockets: the simulator with its MAVLink side (the shim), the companion, which is
+//! Greylag's autopilot, and a MAVLink client that commands attitudes.
 
 mod client;
 mod indicator;
@@ -77,10 +79,11 @@ pub struct Arguments {
     faults: FaultArgs,
 }
 
-/// Flies the schedule. The exit status is 0 if every target was tracked.
+/// Flies the six attitudes of the demonstration, or the given schedule. The exit status is 0 if every attitude was tracked
+/// within [`TOLERANCE_DEG`]. A schedule has no attitudes to judge.
 ///
 /// # Errors
-/// If a file, a link or the simulator cannot be opened, or the flight ends before the schedule does.
+/// If a file, a link or the simulator cannot be opened, or if the flight ends too early.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let model = fly::model(&arguments.model, None)?;
     let Arguments { controller, policy, changes, .. } = arguments;
@@ -175,8 +178,8 @@ fn chosen(arguments: &Arguments) -> Chosen<'_> {
     }
 }
 
-/// Flies the legs as a client of the companion at `to`. Returns the texts that the client received, with their times,
-/// s.
+/// Connects to the companion at `to` as a client and commands the attitudes of `legs` one after the other. Returns the
+/// texts that the client received, with their times, s.
 fn as_client(arguments: &Arguments, to: SocketAddr, legs: &Legs) -> Result<Vec<(f64, String)>> {
     let mut table = Live::begin(legs);
     let ended = arguments.attached.then(input_ends).unwrap_or_default();
@@ -186,8 +189,8 @@ fn as_client(arguments: &Arguments, to: SocketAddr, legs: &Legs) -> Result<Vec<(
     flown
 }
 
-/// The planner's candidate plans, computed again from the recording with the companion `again`. The list is empty if the
-/// replay fails.
+/// The planner's candidate plans shortly after each new target. The companion `again` computes them by replaying the
+/// recording in `folder`. The list is empty if the replay fails.
 fn sights(
     folder: &Path,
     mut again: Companion,
@@ -233,7 +236,7 @@ fn options(arguments: &Arguments, model: &GreyBox) -> Result<FlightOptions> {
     })
 }
 
-/// The simulator's aircraft with the model's airframe and the initial state of the options.
+/// Options of the simulated aircraft, with the model's airframe and with the initial state from the command line.
 fn plant(arguments: &Arguments, model: &GreyBox) -> Result<PlantOptions> {
     let mut plant = arguments.plant.options(arguments.seed);
     let models = std::slice::from_ref(model);
@@ -242,7 +245,7 @@ fn plant(arguments: &Arguments, model: &GreyBox) -> Result<PlantOptions> {
     Ok(plant)
 }
 
-/// Runs the shim on a separate thread until `stop`.
+/// Starts the shim on a separate thread. It runs until `stop` is true.
 fn simulate(
     arguments: &Arguments,
     plant: PlantOptions,
@@ -265,7 +268,8 @@ fn simulate(
         .context("starting the shim's thread")
 }
 
-/// Prints how each target was tracked. If a target was not tracked, also prints the timing problem of this computer.
+/// Prints how well each target was tracked. If one was not tracked, also prints `trouble`, the timing problem of this
+/// computer. The exit status is 0 if all targets were tracked.
 fn verdict(report: &FlightReport<'_>, trouble: Option<&str>) -> ExitCode {
     let (tracked, all) = (report.tracked(), report.segments.len());
     let qualities = report.qualities().unwrap_or_default();

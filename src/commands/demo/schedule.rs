@@ -1,4 +1,6 @@
 //! The schedule of the demonstration: attitude targets and their duration.
+//!
+//! A leg is one commanded attitude. The paper is T. Guerin et al., 2026, whose Table II defines easy and hard targets.
 
 use crate::manoeuvres::Schedule;
 use crate::physics::airframe::Envelope;
@@ -11,19 +13,19 @@ pub struct Leg {
     pub roll_deg: f64,
     /// Commanded pitch angle, degrees.
     pub pitch_deg: f64,
-    /// Easy or hard, Table II of the paper.
+    /// Class of the target in Table II of the paper.
     pub difficulty: Difficulty,
 }
 
-/// Length of a leg, s. Six legs and the start-up take less than a minute.
+/// Duration of a leg, s. Six legs and the start-up take less than a minute.
 pub const LEG_S: f64 = 8.0;
 
-/// Bank limit for which the legs are written, degrees: the largest bank of the paper's hard targets.
+/// Bank limit for which [`LEGS`] is written, degrees: the largest bank of the paper's hard targets.
 const BANK_DEG: f64 = 60.0;
-/// Pitch limit for which the legs are written, up and down, degrees.
+/// Pitch limit for which [`LEGS`] is written, up and down, degrees.
 const PITCH_DEG: f64 = 30.0;
 
-/// Easy targets, then hard targets. Climbs and dives are mixed to keep the altitude.
+/// Easy targets, then hard targets. Climbs and dives alternate so that the altitude changes little.
 pub const LEGS: [Leg; 6] = [
     leg(20.0, 5.0, Difficulty::Easy),
     leg(-30.0, 12.0, Difficulty::Easy),
@@ -37,17 +39,18 @@ const fn leg(roll_deg: f64, pitch_deg: f64, difficulty: Difficulty) -> Leg {
     Leg { roll_deg, pitch_deg, difficulty }
 }
 
-/// Attitude targets of the client: legs of equal length.
+/// Attitude targets that the demonstration's client commands: legs of equal duration.
 #[derive(Clone, Debug)]
 pub struct Legs {
-    /// Attitudes in the order flown.
+    /// Attitudes in the order in which they are flown.
     pub legs: Vec<Leg>,
-    /// Length of each leg, s.
+    /// Duration of each leg, s.
     pub seconds: f64,
 }
 
 impl Legs {
-    /// The legs of the demonstration: [`LEGS`], with roll and pitch scaled down to the limits of `envelope`.
+    /// The legs of the demonstration: [`LEGS`], with roll and pitch scaled down if the limits of `envelope` are narrower than
+    /// `BANK_DEG` and `PITCH_DEG`.
     pub fn demonstration(envelope: &Envelope) -> Legs {
         let Envelope { bank_max_deg, pitch_max_deg, pitch_min_deg, .. } = *envelope;
         let within = |l: &Leg| {
@@ -61,7 +64,8 @@ impl Legs {
         Legs { legs: LEGS.iter().map(within).collect(), seconds: LEG_S }
     }
 
-    /// A single leg with level wings, during which the companion flies `schedule`. The leg ends 2 s after the schedule.
+    /// A single leg with level wings, during which the companion (Greylag's autopilot) flies `schedule`. The leg ends 2 s after
+    /// the schedule.
     pub fn during(schedule: &Schedule) -> Legs {
         Legs { legs: vec![leg(0.0, 0.0, Difficulty::Easy)], seconds: schedule.duration() + 2.0 }
     }

@@ -1,4 +1,8 @@
-//! Evaluation on aircraft drawn from a distribution, and on the aircraft of given models.
+//! `greylag evaluate --any`: flies controllers on aircraft drawn from a distribution, and on the aircraft of given models.
+//!
+//! Each flight takes one minute and has twelve commanded attitudes. A drawn aircraft has an exact model, which simulates it,
+//! and a textbook model, which is estimated from its mass and dimensions. An aircraft is lost if it leaves the limits of
+//! attitude, flow angles and airspeed. The settled error is the attitude error in the last second of each attitude.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -28,12 +32,12 @@ pub(super) struct AnyArguments {
     /// of the chord aft, one elevon or aileron stuck.
     #[arg(long, requires = "any")]
     change: bool,
-    /// Models whose aircraft --any flies too; a controller that needs a model is designed from them.
+    /// Models whose aircraft --any flies too. A controller that needs a model is designed from the model that it flies.
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "any")]
     beside: Vec<PathBuf>,
 }
 
-/// Information that a controller has about the aircraft.
+/// Information from which a controller is designed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Knowledge {
@@ -41,7 +45,7 @@ enum Knowledge {
     Nothing,
     /// The textbook model, estimated from mass, span, area and tail.
     Textbook,
-    /// The aircraft's own model.
+    /// The exact model, which also simulates the aircraft.
     Exact,
 }
 
@@ -55,19 +59,19 @@ impl Knowledge {
     }
 }
 
-/// A flight of one minute with one aircraft and one controller.
+/// One flight of one minute with one aircraft and one controller.
 #[derive(Serialize)]
 pub(super) struct Flight {
     aircraft: String,
     pub(super) controller: &'static str,
     knows: Knowledge,
-    /// Name of the change after 30 s. `None` if nothing changed.
+    /// Name of the change of the aircraft after 30 s. `None` if the aircraft does not change.
     #[serde(skip_serializing_if = "Option::is_none")]
     change: Option<&'static str>,
-    /// Results of the minute. `None` if no controller could be designed.
+    /// Results of the flight. `None` if no controller could be designed.
     minute: Option<Minute>,
-    /// Ratios of the derivatives estimated in this flight to the aircraft's own, in the order of `DERIVATIVES`; `None`
-    /// for an unknown one. Empty after a change.
+    /// Derivatives estimated in this flight, divided by those of the exact model, in the order of `DERIVATIVES`. `None` for a
+    /// derivative that the flight does not determine. Empty if the aircraft changes or cannot be trimmed.
     pub(super) derivative_ratios: Vec<Option<f64>>,
 }
 
@@ -154,7 +158,7 @@ fn print(kinds: &[ControllerKind], drawn: &[Flight], changed: &[Flight], others:
     }
 }
 
-/// Information from which a controller of this kind may be designed.
+/// Information from which a controller of this kind can be designed.
 fn knowledge(kind: ControllerKind) -> &'static [Knowledge] {
     match kind.needs() {
         Needs::Gains => &[Knowledge::Nothing],
@@ -199,7 +203,7 @@ fn of_controller(
     flight: [u64; 2],
     changes: &[Option<Changed>],
 ) -> Vec<Flight> {
-    // designed once for all changes: the design of an LQI takes longer than its flight
+    // one controller serves all changes, because the design of an LQI takes longer than the simulation of its flight
     let mut controller = build(kind, from).ok();
     let mut fly = |changed: &Option<Changed>| {
         let mut estimator = AircraftEstimator::new(&exact.airframe);
@@ -223,7 +227,8 @@ fn of_controller(
     changes.iter().map(&mut fly).collect()
 }
 
-/// A table of the aircraft that were not lost after each change: one row for each controller, its information and a change.
+/// A table with one row for each controller, its information and a change. It counts the aircraft that the controller does not
+/// lose without a change. It states the percentage of them that are not lost with the change either, and their settled error.
 fn after_changes(kinds: &[ControllerKind], before: &[Flight], after: &[Flight]) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
@@ -234,7 +239,7 @@ fn after_changes(kinds: &[ControllerKind], before: &[Flight], after: &[Flight]) 
             let unchanged: Vec<&Flight> = before.iter().filter(own).collect();
             for change in Change::ALL {
                 let changed = after.iter().filter(own).filter(|f| f.change == Some(change.name()));
-                // both lists have the same order of aircraft
+                // both lists have the aircraft in the same order
                 let pairs = unchanged.iter().zip(changed).filter(|(u, _)| kept(u).is_some());
                 let flights: Vec<&Flight> = pairs.map(|(_, c)| c).collect();
                 let minutes: Vec<f64> =
@@ -252,7 +257,7 @@ fn after_changes(kinds: &[ControllerKind], before: &[Flight], after: &[Flight]) 
     table
 }
 
-/// A table over all drawn aircraft: one row for each controller and its information.
+/// A table over all drawn aircraft: one row for each controller and the information from which it is designed.
 fn summary(kinds: &[ControllerKind], flights: &[Flight]) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
@@ -285,7 +290,7 @@ fn summary(kinds: &[ControllerKind], flights: &[Flight]) -> Table {
     table
 }
 
-/// `some` of `all` in percent; a dash if `all` is zero, for example if every aircraft was lost.
+/// `some` as a percentage of `all`; a dash if `all` is zero, for example if every aircraft was lost.
 pub(super) fn percent(some: usize, all: usize, digits: usize) -> String {
     match all {
         0 => "-".into(),

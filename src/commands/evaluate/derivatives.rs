@@ -1,4 +1,5 @@
-//! Derivatives of drawn aircraft estimated from a minute of flight, compared with the aircraft's own.
+//! Stability and control derivatives of randomly drawn aircraft: the values estimated in a flight of one minute, compared
+//! with the true ones.
 
 use comfy_table::Table;
 
@@ -10,12 +11,13 @@ use crate::model::population::{Character, TRAITS};
 use crate::num::statistics::quantile;
 use crate::physics::atmosphere::STANDARD_GRAVITY;
 
-/// For each derivative, the trait with its magnitude and the power of V/g that makes it dimensionless.
+/// For each derivative: name of the trait in `TRAITS` from which its magnitude is taken, and the power of V/g (cruise airspeed
+/// over gravity) by which the trait is made dimensionless.
 const MAGNITUDES: [(&str, i32); DERIVATIVES.len()] =
     [("roll power", 2), ("roll damping", 1), ("pitch power", 2), ("pitch stiffness", 2)];
 
-/// The aircraft's own derivatives, in the order and the units of `AircraftEstimator::derivatives`. `None` for an aircraft that
-/// cannot be trimmed at its cruise airspeed.
+/// The true derivatives of the aircraft `model`, in the order and the units of `AircraftEstimator::derivatives`. `None` if
+/// the aircraft cannot be trimmed at its cruise airspeed.
 fn own(model: &GreyBox) -> Option<[f64; DERIVATIVES.len()]> {
     let values = Character::of(model).ok()?.values;
     let time = model.airframe.envelope.airspeed_cruise_mps / STANDARD_GRAVITY;
@@ -28,16 +30,16 @@ fn own(model: &GreyBox) -> Option<[f64; DERIVATIVES.len()]> {
     Some(own)
 }
 
-/// Ratios of the estimated derivatives to the aircraft's own; `None` for a derivative that the flight does not
-/// determine. Empty for an aircraft that cannot be trimmed.
+/// Ratios of the estimated derivatives to the true ones. A derivative that the flight does not determine is `None`. The
+/// result is empty for an aircraft that cannot be trimmed.
 pub(super) fn ratios(estimator: &AircraftEstimator, exact: &GreyBox) -> Vec<Option<f64>> {
     let Some(own) = own(exact) else { return Vec::new() };
     let all = estimator.derivatives().into_iter().zip(own);
     all.map(|(estimated, own)| Some(estimated / own).filter(|r| r.is_finite())).collect()
 }
 
-/// One row for each controller and derivative: median and 90th percentile of the relative error over the flights in which
-/// the aircraft was not lost.
+/// One row for each controller and derivative: percentage of the flights that determine the derivative, and median and 90th
+/// percentile of the relative error over these flights. Flights in which the aircraft was lost are excluded.
 pub(super) fn table(kinds: &[ControllerKind], flights: &[Flight]) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);

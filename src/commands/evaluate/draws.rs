@@ -1,4 +1,5 @@
-//! Evaluation in models whose coefficients are drawn from their prior distributions.
+//! Evaluation of controllers in simulations of random models. The coefficients of each random model (a draw) are drawn from
+//! the prior distributions of one model's coefficients.
 
 use std::process::ExitCode;
 
@@ -13,7 +14,7 @@ use crate::num::statistics::quantile;
 use crate::sim::evaluation::{Evaluation, Robustness};
 use crate::sim::targets::Row;
 
-/// The JSON document of flights in drawn models.
+/// The JSON document of the evaluation.
 #[derive(Serialize)]
 struct DrawsDocument<'a> {
     schema: &'static str,
@@ -25,7 +26,8 @@ struct DrawsDocument<'a> {
     controllers: &'a [Robustness],
 }
 
-/// Evaluates the controllers in draws of the first model, prints the tables, writes the JSON.
+/// Evaluates the controllers in `draws` draws of the first model, prints the tables and writes the JSON. The controllers are
+/// built for each of `models`, and every one flies in draws of the first.
 pub(super) fn over_draws(
     arguments: &Arguments,
     draws: u32,
@@ -67,7 +69,8 @@ pub(super) fn over_draws(
     Ok(ExitCode::SUCCESS)
 }
 
-/// Results of each controller over the draws.
+/// Table of each controller's results over the draws. The mean of a draw is the mean settled error over all targets (mean of
+/// roll and pitch RMSE over the last fifth of a flight, degrees). A draw has a divergence if a target diverged in it.
 fn draws_table(flown: &[Robustness]) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);

@@ -1,4 +1,5 @@
-//! Tables of an evaluation on the terminal: a table for each group of targets, a column for each controller.
+//! Tables of an evaluation on the terminal. An evaluation scores a controller on flights to target attitudes. Each group
+//! of targets has a table, with a column for each controller.
 
 use comfy_table::{ContentArrangement, Table};
 
@@ -8,12 +9,12 @@ use crate::report::evaluation_answer;
 use crate::sim::evaluation::{Evaluation, Score};
 use crate::sim::published::published;
 
-/// Largest width of a table, terminal columns.
+/// Largest width of a table, characters.
 const WIDTH: u16 = 100;
 /// Largest number of controllers in a table.
 const BESIDE: usize = 4;
 
-/// The measures that the terminal shows. JSON and page have all measures.
+/// Identifiers of the measures that the terminal shows. JSON file and HTML page have all measures.
 const SHOWN: [&str; 13] = [
     "error_integral_deg_s",
     "to_one_deg_s",
@@ -131,8 +132,7 @@ mod tests {
     use crate::sim::targets::TargetFile;
     use std::time::Duration;
 
-    /// A terminal of 100 columns has room for five controllers with the longest names and all
-    /// groups.
+    /// The tables of five controllers are at most 100 characters wide, and hold all controllers and groups.
     #[test]
     fn the_tables_fit_a_hundred_columns_and_hold_every_controller() {
         let rows = TargetFile::generate(1).rows;

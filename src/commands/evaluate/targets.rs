@@ -1,4 +1,5 @@
-//! Flights of an evaluation: to the targets of a file, and steps between attitudes.
+//! The flights by which `greylag evaluate` scores a controller. Each flies to a target (a commanded roll and pitch) of a file,
+//! or steps from one random attitude to another.
 
 use anyhow::{Result, bail};
 
@@ -10,7 +11,7 @@ use crate::sim::evaluation::{Course, courses as of_targets};
 use crate::sim::steps::steps;
 use crate::sim::targets::{Row, TargetFile};
 
-/// The targets that the options select.
+/// The targets of the file that the options select; empty with `--no-targets`.
 pub(super) fn rows(arguments: &Arguments) -> Result<Vec<Row>> {
     if arguments.no_targets {
         if arguments.steps == 0 {
@@ -33,7 +34,8 @@ pub(super) fn rows(arguments: &Arguments) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// The targets inside the airframe's envelope. Prints the number of excluded targets.
+/// The targets of `rows` within the bank and pitch limits of the airframe's envelope, or all with `--beyond-envelope`. Prints
+/// the number of excluded targets.
 pub(super) fn within_envelope(
     mut rows: Vec<Row>,
     arguments: &Arguments,
@@ -59,7 +61,7 @@ pub(super) fn within_envelope(
     Ok(rows)
 }
 
-/// The flights to the targets `rows` at `airspeed` (m/s), then the steps.
+/// The flights to the targets `rows` at a commanded airspeed of `airspeed` (m/s), followed by the flights with a step.
 pub(super) fn courses(
     arguments: &Arguments,
     rows: &[Row],

@@ -1,5 +1,8 @@
-//! The file in which a fault campaign records its flights, one JSON object per line. An interrupted campaign resumes from
-//! this file.
+//! The file in which a fault campaign records its flights, one JSON object per line. An interrupted campaign resumes from this
+//! file.
+//!
+//! A fault campaign flies the companion (Greylag's autopilot) in simulation, with random faults. A finding is a violated
+//! requirement.
 
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
@@ -15,12 +18,12 @@ use crate::sim::faults::{Case, Cause, Fault, Finding, Found, Report, draw};
 /// Start of every line.
 const START: &str = "{\"controller\":";
 
-/// A flight of the campaign. Its faults follow from its seed.
+/// A flight of the campaign. Its faults are drawn with its seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
     /// Name of the controller.
     pub controller: String,
-    /// Name of the flight controller or simulator at the vehicle's link.
+    /// Name of the flight controller or simulator to which the companion is connected.
     pub counterpart: String,
     /// Seed of the flight's faults.
     pub seed: u64,
@@ -28,14 +31,14 @@ pub struct Entry {
     pub findings: Vec<Note>,
 }
 
-/// A finding in the ledger's file.
+/// A finding as it is recorded in the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Note {
     /// Time of the finding, s.
     pub at_s: f64,
     /// Name of the finding.
     pub finding: String,
-    /// Name of the established cause; `None` without one.
+    /// Name of the cause to which the finding is attributed; `None` without one.
     pub cause: Option<String>,
 }
 
@@ -89,7 +92,7 @@ impl Note {
         }
     }
 
-    /// Whether the finding fails the campaign: it has no established cause, or it occurs without any fault too.
+    /// Whether the finding fails the campaign: it has no established cause, or the same flight without faults has it too.
     pub fn is_failure(&self) -> bool {
         self.cause.as_deref().is_none_or(|cause| cause == Cause::Itself.name())
     }
@@ -102,8 +105,8 @@ pub struct Ledger {
 }
 
 impl Ledger {
-    /// Opens or creates the file. An incomplete last line, which a killed run leaves, is removed. Its flight is flown
-    /// again.
+    /// Opens or creates the file. Removes an incomplete last line, which a killed run leaves; [`Ledger::find`] does not know
+    /// its flight.
     pub fn open(path: &Path) -> Result<Self> {
         let mut known = HashMap::new();
         let mut whole = 0;
@@ -122,7 +125,7 @@ impl Ledger {
                 known.insert(entry.key(), entry);
                 line.clear();
             }
-            // a killed run may have cut off its first line anywhere; a file with other content must not be emptied
+            // A killed run may have cut off its first line anywhere. A file with other content must not be emptied.
             let cut = line.starts_with(START) || START.starts_with(&line);
             ensure!(
                 whole > 0 || cut,
@@ -139,7 +142,7 @@ impl Ledger {
         Ok(Ledger { known, file: Mutex::new(file) })
     }
 
-    /// Entry of an earlier run for the same case.
+    /// Entry of an earlier run with the controller, the counterpart and the seed of `case`; `None` without one.
     pub fn find(&self, case: &Case) -> Option<Entry> {
         let key =
             (case.controller.name().to_owned(), case.counterpart.name().to_owned(), case.seed);

@@ -1,4 +1,5 @@
-//! `greylag faults --monitor`: false-alarm rate and detection delay of the model monitor.
+//! `greylag faults --monitor`: false-alarm rate and detection delay of the model monitor. The monitor compares measured
+//! accelerations with those that the model predicts, and warns of failures such as a stuck surface.
 
 use std::process::ExitCode;
 
@@ -12,7 +13,8 @@ use crate::sim::faults::{ATTITUDE_DEG, CompanionFactory, FAILS_S, Failure, Watch
 /// Largest accepted fraction of healthy flights with a false alarm: one in forty.
 const FALSE_ALARMS: f64 = 1.0 / 40.0;
 
-/// Flies the flights and prints a table. The exit status is 1 if too many healthy flights had a false alarm.
+/// Flies `flights` simulated flights with each failure and as many healthy ones (without a failure), and prints a table. The
+/// exit status is 1 if too many healthy flights had a false alarm. `first` is the first random seed.
 ///
 /// # Errors
 /// If the aircraft cannot be built, or a seed would exceed 64 bits.
@@ -57,7 +59,8 @@ fn row(failure: Failure, watched: &[Watched], alarms: usize) -> Vec<String> {
     let mut delays: Vec<f64> = watched.iter().filter_map(Watched::delay_s).collect();
     delays.sort_by(f64::total_cmp);
     let at = |share: f64| {
-        // Failures that were not detected count as the longest delays.
+        // The quantile is taken over all engaged flights, in which the companion had control: undetected failures count as the
+        // longest delays.
         let index = (share * engaged.max(1) as f64).ceil() as usize;
         delays.get(index.saturating_sub(1)).map_or("-".into(), |s| format!("{s:.1} s"))
     };

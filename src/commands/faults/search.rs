@@ -1,4 +1,5 @@
-//! `greylag faults --search`: searches for flights that violate a flight rule.
+//! `greylag faults --search`: searches for simulated flights with faults that violate a flight rule. The robustness of a rule
+//! is its normalised margin in a flight, −1 to 1: negative if the flight violates the rule.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -15,7 +16,7 @@ use crate::sim::faults::search::{Nearest, distances, search};
 use crate::sim::faults::{CompanionFactory, Counterpart, Scenario};
 use crate::sysid::progress::Stage;
 
-/// Inputs of a search for faults.
+/// Inputs of a search.
 pub(super) struct Search<'a> {
     pub(super) factory: &'a CompanionFactory,
     pub(super) counterparts: &'a [Counterpart],
@@ -24,7 +25,7 @@ pub(super) struct Search<'a> {
     pub(super) json: &'a JsonArgument,
 }
 
-/// Result of the search for one rule, as JSON.
+/// Result of the search for one rule, as JSON. `distance` is the smallest robustness and `at_s` its time in the flight, s.
 #[derive(Serialize)]
 struct Row<'a> {
     policy: &'a str,
@@ -33,7 +34,8 @@ struct Row<'a> {
     broken: u64,
     distance: Option<f64>,
     at_s: f64,
-    /// The flight with the smallest robustness, simplified if it violates the rule.
+    /// The flight with the smallest robustness. If it violates the rule, it was simplified, for example by removing faults, as
+    /// long as the violation remained.
     scenario: Option<&'a Scenario>,
 }
 
@@ -43,7 +45,7 @@ struct Document<'a> {
     policies: Vec<Row<'a>>,
 }
 
-/// Searches, and prints the smallest robustness of each rule. The exit status is 1 if a rule was violated.
+/// Runs the search and prints the smallest robustness of each rule. The exit status is 1 if a rule was violated.
 pub(super) fn run(search_for: &Search) -> Result<ExitCode> {
     let Search { factory, counterparts, flights, seed, json } = *search_for;
     let bar = Bar::new();
@@ -91,7 +93,7 @@ fn print(found: &[Nearest]) {
     println!("{table}");
     for n in found.iter().filter(|n| n.broken > 0) {
         let Some(scenario) = &n.scenario else { continue };
-        // a scenario of numbers and names can always be serialised
+        // serialisation cannot fail: a scenario consists of numbers and names
         let text = serde_json::to_string(scenario).unwrap_or_default();
         println!(
             "\n{}, the smallest flight found; `greylag faults --scenario FILE` flies it:\n{text}",
@@ -100,7 +102,7 @@ fn print(found: &[Nearest]) {
     }
 }
 
-/// Flies the scenario in `file`, and prints the robustness of each rule. The exit status is 1 if a rule was violated.
+/// Flies the scenario in `file` and prints the robustness of each rule. The exit status is 1 if a rule was violated.
 pub(super) fn fly(factory: &CompanionFactory, file: &Path) -> Result<ExitCode> {
     let text = crate::physics::text_file::read(file)
         .with_context(|| format!("reading the scenario {}", file.display()))?;

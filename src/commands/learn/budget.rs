@@ -1,46 +1,47 @@
-//! Budgets of `greylag learn`: numbers of flights, updates and hidden units.
+//! Budgets of `greylag learn`: numbers of flights, of gradient updates and of hidden units. The command learns a model (a
+//! prior with a neural residual) from simulated flights, and then trains a policy in the model.
 
 use clap::ValueEnum;
 
-/// A budget by name.
+/// Amount of computation by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Budget {
-    /// Tens of seconds, for a first try.
+    /// Takes tens of seconds, for a first try.
     Quick,
-    /// A controller that flies acceptably, in minutes on two cores.
+    /// Gives a controller that flies acceptably, in minutes on two cores.
     Standard,
-    /// The paper's numbers of flights and updates: hours with td3.
+    /// Uses the paper's numbers of flights and updates: hours with td3.
     Paper,
 }
 
-/// Name of the training algorithm of the policy.
+/// Training algorithm of the policy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Algorithm {
-    /// Analytic policy gradient through the model, then critics fitted to the resulting policy.
+    /// Analytic policy gradient through the model; then critics (value functions) are fitted to the resulting policy.
     Analytic,
-    /// TD3 as in the paper.
+    /// TD3 (twin delayed deep deterministic policy gradient) as in the paper.
     Td3,
 }
 
-/// Numbers of flights and updates of a budget, without those of the policy.
+/// Numbers of flights, updates and hidden units with which a budget learns the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sizes {
-    /// Number of random episodes.
+    /// Number of first flights, with random actions.
     pub episodes: u32,
-    /// Number of planned episodes in a round.
+    /// Number of flights in each later round, with actions planned through the model learned so far.
     pub planned: u32,
-    /// Number of planned rounds.
+    /// Number of later rounds.
     pub rounds: u32,
-    /// Updates of an intermediate model, which only plans the next round.
+    /// Gradient updates of each intermediate model, which is used only to plan the next round.
     pub passing_updates: u64,
-    /// Updates of the last model.
+    /// Gradient updates of the last model.
     pub updates: u64,
-    /// Units of the residual's hidden layers, separated by commas.
+    /// Numbers of units of the residual's hidden layers, separated by commas.
     pub hidden: &'static str,
 }
 
 impl Budget {
-    /// The numbers of flights and updates.
+    /// The numbers with which this budget learns the model.
     pub const fn sizes(self) -> Sizes {
         match self {
             Budget::Quick => Sizes {
@@ -70,12 +71,12 @@ impl Budget {
         }
     }
 
-    /// Whether planners, which take milliseconds a step, are flown in the model as well.
+    /// Whether planners, too, are scored in simulations of the model. A planner takes milliseconds per step.
     pub fn flies_planners(self) -> bool {
         self != Budget::Quick
     }
 
-    /// The options of `train policy`.
+    /// The options of `greylag train policy` with this budget and `algorithm`.
     pub const fn policy(self, algorithm: Algorithm) -> &'static [&'static str] {
         use Algorithm::{Analytic, Td3};
         match (self, algorithm) {

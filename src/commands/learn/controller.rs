@@ -38,7 +38,7 @@ struct Origin<'a> {
     model: &'a str,
     stages: Vec<String>,
     files: Vec<Content>,
-    /// Scores in the learned model, without a simulator.
+    /// Scores of flights in the learned model instead of JSBSim.
     imagined: &'a [Reached],
 }
 
@@ -48,8 +48,8 @@ struct Content {
     sha256: String,
 }
 
-/// Copies model and policy from the output folder `out` into its subfolder `controller`. The model file is copied last. A
-/// folder with a model file is therefore complete.
+/// Copies model and policy from the output folder `out` into its subfolder `controller`, and writes the record of origin.
+/// The model file is copied after all other files: where it exists, they exist.
 ///
 /// # Errors
 /// If a file cannot be read or written.

@@ -1,4 +1,9 @@
-//! Scores of the controllers that use a learned model and its policy, flown in that model.
+//! Scores of controllers that fly in the learned model itself instead of the simulator. The controllers use this model, or the
+//! policy (a neural network) trained in it.
+//!
+//! A controller flies to targets: commanded roll and pitch. Its settled error for a target is the mean of the RMS errors of
+//! roll and pitch in the last fifth of the flight. Easy targets have less than 45° of roll and 25° of pitch.
+//! Targets in the hard corners have 45° to 60° of roll and 25° to 30° of pitch, to either side.
 
 use std::path::Path;
 
@@ -13,11 +18,11 @@ use crate::model::GreyBox;
 use crate::sim::evaluation::{Evaluation, imagine};
 use crate::sim::{Group, TargetFile};
 
-/// Seed of the targets. These targets differ from the targets of `greylag evaluate` and from the targets by which a
-/// training chooses its policy.
+/// Seed of the targets. It differs from the seed of the targets of `greylag evaluate`, and from the seed of the targets by which
+/// a training chooses its best policy.
 const TARGETS: u64 = 3;
-/// Controllers, each with a number n: the controller flies one target in n. A planner takes milliseconds a step, and few
-/// targets suffice for the LQI.
+/// The controllers that fly, each with a number n: the controller flies one target in n. Few targets suffice for the LQI. The
+/// hybrid controller plans with the model at each step, which takes milliseconds. It flies the fewest targets.
 const EVERY: [(ControllerKind, u32); 3] =
     [(ControllerKind::Policy, 1), (ControllerKind::Lqi, 4), (ControllerKind::HybridLqi, 24)];
 
@@ -30,18 +35,18 @@ pub struct Reached {
     pub targets: usize,
     /// Mean settled error on easy targets, degrees.
     pub easy_deg: f64,
-    /// Mean settled error in the hard corners, degrees.
+    /// Mean settled error on targets in the hard corners, degrees.
     pub hard_deg: f64,
-    /// Fraction of the targets that diverged (settled error over 10°).
+    /// Fraction of the targets with a settled error over 10°.
     pub divergence_rate: f64,
 }
 
-/// Flies the controllers in the model of the folder `folder`, with the policy in the folder `policy`. `None` if
-/// interrupted.
+/// Flies the controllers in the model `model.toml` of `folder`, with the policy in the folder `policy`. Returns `None` if the
+/// user interrupts the program. `seed` is the seed of the controllers.
 ///
 /// # Errors
-/// If the model or the policy cannot be read or is invalid. Other controllers that cannot be built are left out, for
-/// example an LQI that cannot be designed.
+/// If the model or the policy cannot be read or is invalid. If another controller cannot be built, such as an LQI that cannot be
+/// designed, it is left out and no error is returned.
 pub fn reached(
     folder: &Path,
     policy: &Path,

@@ -1,4 +1,5 @@
-//! `greylag learn`: learns model and policy from a prior in one command.
+//! `greylag learn`: learns a model and a policy in one command. It starts from a prior, a physical model of the aircraft that
+//! may be wrong.
 
 mod budget;
 mod controller;
@@ -41,28 +42,28 @@ pub struct Arguments {
     /// The prior: a model file that may be wrong.
     #[arg(long, value_name = "FILE", required_unless_present = "earlier")]
     prior: Option<PathBuf>,
-    /// Continue an earlier run with recent flights (--log): the output folder of that run, or a folder
-    /// with a model and its policy, such as params/x8/learned. Its flights are used again if they
-    /// exist, and its policy is trained further; the folder is not changed.
+    /// Continue an earlier run with recent flights (--log). DIR is the output folder of that run, or a
+    /// folder with a model and its policy, such as params/x8/learned. Flights in DIR are used again,
+    /// and its policy is trained further. DIR is not changed.
     #[arg(long = "continue", value_name = "DIR", requires = "logs", conflicts_with_all = ["prior", "collect", "algorithm"])]
     earlier: Option<PathBuf>,
-    /// With --continue: fraction of the samples that come from the recent flights; 1 ignores the earlier flights.
+    /// With --continue: fraction of the training samples that come from the recent flights. 1 ignores the earlier flights.
     #[arg(long, value_name = "PART", default_value_t = 0.5, conflicts_with = "prior", value_parser = share)]
     recent_share: f64,
     /// Fly the training flights in JSBSim.
     #[arg(long, conflicts_with = "logs", required_unless_present = "logs")]
     collect: bool,
-    /// Learn from these flight logs instead; no rounds are flown.
+    /// Learn from these flight logs; no flights are simulated.
     #[arg(long = "log", value_name = "LOG", num_args = 1..)]
     logs: Vec<PathBuf>,
-    /// Folder of all outputs; an interrupted run found there is resumed.
+    /// Folder of all outputs. An interrupted run found there is resumed.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Controller of the first flights, with half of the actions random, as in `greylag collect`. Without a controller all
-    /// actions of the first flights are random.
+    /// Controller that flies the first flights, as in `greylag collect`; half of the actions are still random. Without a
+    /// controller all actions of the first flights are random.
     #[arg(long, value_enum, value_name = "NAME", requires = "collect")]
     explorer: Option<Explorer>,
-    /// Rounds of flights planned with the model learned so far [default: by --budget].
+    /// Number of rounds of flights. The flights of a round are planned with the model learned so far [default: by --budget].
     #[arg(long, conflicts_with = "logs", value_parser = clap::value_parser!(u32).range(0..=20))]
     rounds: Option<u32>,
     /// Training algorithm of the policy.
@@ -71,7 +72,8 @@ pub struct Arguments {
     /// Amount of computation: quick, standard (minutes on two cores) or paper (the paper's numbers).
     #[arg(long, default_value = "standard", value_enum)]
     budget: Budget,
-    /// Coefficients of the prior that are learned with the residual: full names, `all`, or `none`.
+    /// Coefficients of the prior that are learned together with the residual, the network that corrects
+    /// the prior: full names, `all`, or `none`.
     #[arg(long, num_args = 1.., value_delimiter = ',', default_value = "all", value_name = "NAME")]
     trainable: Vec<String>,
     /// With --log: ignore the prior standard deviations of the coefficients, for a prior whose numbers are guesses.
@@ -80,7 +82,7 @@ pub struct Arguments {
     /// Seed of all random draws.
     #[arg(long, default_value_t = 1)]
     seed: u32,
-    /// Folder that holds NAME/NAME.xml of the aircraft that flies in JSBSim.
+    /// Folder with NAME/NAME.xml of the aircraft that flies in JSBSim.
     #[arg(long, value_name = "DIR", requires_all = ["aircraft", "collect"])]
     aircraft_dir: Option<PathBuf>,
     /// Name of the aircraft that flies in JSBSim [default: the X8].
@@ -157,7 +159,7 @@ impl Arguments {
         }
     }
 
-    /// Results of the earlier run in `folder` from which this run continues.
+    /// The parts of the earlier run in `folder` that this run reuses, with the recent logs.
     fn recent(&self, folder: &Path) -> Result<Recent> {
         let policy = shipped(&flying(folder)?.join(plan::POLICY));
         if !policy.exists() {
@@ -177,8 +179,7 @@ impl Arguments {
         Ok(Recent { flights, policy, logs: self.logs.clone(), share: self.recent_share })
     }
 
-    /// Hashes of the inputs of this run: prior, airframe, logs, and the policy from which it
-    /// continues.
+    /// Fingerprints of the inputs of this run: prior, airframe, logs, and the policy that is trained further.
     fn inputs(&self, prior: &GreyBox) -> Result<Vec<String>> {
         let mut hashes = vec![prior.sha256.clone(), format!("{:?}", prior.airframe)];
         let mut files = self.logs.clone();
@@ -193,7 +194,7 @@ impl Arguments {
         Ok(hashes)
     }
 
-    /// The coefficients that are learned, by their full names or as `all`.
+    /// The coefficients that are learned: their full names, or the word `all`.
     fn trained(&self, prior: &GreyBox) -> Result<Vec<String>> {
         let known = trainable(prior);
         let names = match self.trainable.as_slice() {
@@ -211,8 +212,8 @@ impl Arguments {
         }
     }
 
-    /// Options that select the aircraft, its hidden effects and its airspeed. The airspeed is that of the prior,
-    /// because the first round has no model yet.
+    /// Options that select the simulated aircraft, its hidden effects and its initial airspeed. The airspeed is that of the
+    /// prior, because the first flights have no learned model yet.
     fn aircraft_options(&self, prior: &GreyBox) -> Vec<OsString> {
         let mut words: Vec<OsString> = Vec::new();
         let mut add = |name: &str, value: OsString| words.extend([name.into(), value]);
@@ -226,7 +227,7 @@ impl Arguments {
         words
     }
 
-    /// Scores the result in its model, assembles the controller's folder and prints the result.
+    /// Scores the learned policy in the learned model, writes both into the controller's folder, and prints the scores.
     fn finish(
         &self,
         prior: &GreyBox,
@@ -264,7 +265,8 @@ impl Arguments {
     }
 }
 
-/// Largest fraction of diverged targets with which a controller counts as ready to fly. The LQI loses none.
+/// Largest fraction of target attitudes that a policy ready to fly may lose. A target is lost if the attitude error in the
+/// last part of its flight is above 10°.
 const LOST: f64 = 0.02;
 
 /// Verdict on the learned policy in words, with the command that flies it.
@@ -288,8 +290,8 @@ fn worth(reached: &[Reached], options: &str) -> String {
     }
 }
 
-/// The folder with the model and the policy of an earlier run: its subfolder of the controller if there is one, else
-/// `folder` itself.
+/// The folder with the model and the policy of an earlier run: the subfolder `controller` of `folder` if it has a model,
+/// else `folder` itself.
 fn flying(folder: &Path) -> Result<PathBuf> {
     let places = [folder.join(controller::CONTROLLER), folder.to_owned()];
     let place = places.into_iter().find(|place| shipped(&place.join("model.toml")).exists());

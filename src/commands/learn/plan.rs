@@ -1,4 +1,7 @@
-//! The stages from a prior to a flying controller, each a command line of this program.
+//! The stages of `greylag learn`. Each stage is a command line of this program.
+//!
+//! The stages lead from a prior, which is a physical model that may be wrong, to a policy that flies the aircraft. They collect
+//! flights, learn a model from them, and train the policy in this model.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -6,39 +9,39 @@ use std::path::{Path, PathBuf};
 use super::budget::{Algorithm, Budget};
 use crate::commands::collect::Explorer;
 
-/// Folder of the flights, below the output folder of `greylag learn`.
+/// Name of the flights' folder in the output folder of `greylag learn`.
 pub const FLIGHTS: &str = "flights";
-/// Folder of the last model, below the output folder of `greylag learn`.
+/// Name of the last model's folder in the output folder of `greylag learn`.
 pub const MODEL: &str = "model";
-/// Folder of the policy, below the output folder of `greylag learn`.
+/// Name of the policy's folder in the output folder of `greylag learn`.
 pub const POLICY: &str = "policy";
 
-/// Source of the flights.
+/// Source of the flights from which the model is learned.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source {
-    /// JSBSim, with these further options of `greylag collect`.
+    /// Flights in JSBSim, flown by `greylag collect`.
     Simulator {
-        /// Options of the aircraft.
+        /// Further options of `greylag collect`, which select the aircraft.
         options: Vec<OsString>,
         /// Controller of the first flights; `None` for random actions.
         explorer: Option<Explorer>,
     },
     /// Recorded logs at these paths.
     Logs(Vec<PathBuf>),
-    /// Recent logs with which an earlier run is continued.
+    /// Recent logs and the results of an earlier run, which is continued.
     Recent(Recent),
 }
 
-/// Results of an earlier run from which this run continues.
+/// Results of an earlier run, and the recent logs with which it is continued.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recent {
     /// Folder of the earlier run's flights; `None` if there is none.
     pub flights: Option<PathBuf>,
     /// Folder of the earlier run's policy.
     pub policy: PathBuf,
-    /// Paths of the logs.
+    /// Paths of the recent logs.
     pub logs: Vec<PathBuf>,
-    /// Fraction of all samples that these logs make up.
+    /// Fraction of the training samples that are taken from these logs.
     pub share: f64,
 }
 
@@ -51,11 +54,11 @@ pub struct Inputs<'a> {
     pub out: &'a Path,
     /// Source of the flights.
     pub source: Source,
-    /// Number of planned rounds.
+    /// Number of rounds of simulated flights after the first ones. A planner flies them with the model learned so far.
     pub rounds: u32,
     /// Coefficients of the prior that are learned. An empty list freezes the prior.
     pub trainable: &'a [String],
-    /// Whether the prior standard deviations of the coefficients are ignored.
+    /// Whether learning ignores the prior standard deviations of the coefficients.
     pub from_scratch: bool,
     /// Training algorithm of the policy.
     pub algorithm: Algorithm,
@@ -94,7 +97,8 @@ impl Line {
 }
 
 impl Inputs<'_> {
-    /// The stages in order: flights, model, flights planned through that model, model, …, policy.
+    /// The stages in order. In simulation: first flights, a model, flights planned with this model, the next model and so on, and
+    /// finally the policy. With logs: the model and the policy.
     pub fn stages(&self) -> Vec<Stage> {
         let mut stages = Vec::new();
         if let Source::Simulator { .. } = self.source {
@@ -109,7 +113,7 @@ impl Inputs<'_> {
         stages
     }
 
-    /// The folder of the model that plans `round`. `None` stands for the last model.
+    /// The folder of the model with which `round` is planned. For `None`, the folder of the last model.
     fn folder(&self, round: Option<u32>) -> PathBuf {
         match round {
             Some(round) => self.out.join(format!("{MODEL}-{round}")),
@@ -142,7 +146,7 @@ impl Inputs<'_> {
         Stage { what: format!("{episodes} flights {how}"), line: line.0 }
     }
 
-    /// The stage that trains the model that plans `round`. `None` stands for the last model.
+    /// The stage that trains the model with which `round` is planned. For `None`, the stage that trains the last model.
     fn model(&self, round: Option<u32>) -> Stage {
         let sizes = self.budget.sizes();
         let updates = round.map_or(sizes.updates, |_| sizes.passing_updates);
@@ -205,7 +209,7 @@ impl Inputs<'_> {
 }
 
 impl Stage {
-    /// The command as typed in a shell.
+    /// The command as it is typed in a shell.
     pub fn command(&self) -> String {
         let quoted = |word: &OsString| match word.to_string_lossy() {
             word if word.contains([' ', '\'', '"', '$', '*']) => {

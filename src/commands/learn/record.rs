@@ -1,4 +1,6 @@
 //! Record of the progress of `greylag learn` on disk. An interrupted run resumes from the record.
+//!
+//! `greylag learn` works in stages; each stage is one command line, such as the training of a policy.
 
 use std::path::{Path, PathBuf};
 
@@ -25,7 +27,7 @@ struct File {
     stages: Vec<Done>,
 }
 
-/// A stage that is done.
+/// A stage that is completed.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Done {
@@ -33,7 +35,7 @@ pub struct Done {
     pub what: String,
     /// Command line of the stage.
     pub command: String,
-    /// Duration of the session that completed the stage, s.
+    /// Duration of the process that completed the stage, s.
     pub seconds: f64,
 }
 
@@ -45,8 +47,8 @@ pub struct Record {
 }
 
 impl Record {
-    /// Opens the record in `folder` of a run with these `stages` and `inputs` (hashes of its input files). If there is no
-    /// record, an empty one is written before anything is flown.
+    /// Opens the record in `folder` and checks that it belongs to a run with these `stages` and `inputs` (hashes of its input
+    /// files). If there is no record, an empty one is written.
     ///
     /// # Errors
     /// If the folder holds the record of another run or flights without a record, or cannot be read or written.
@@ -82,12 +84,12 @@ impl Record {
         Ok(Record { path, file })
     }
 
-    /// The stages that are done.
+    /// The completed stages in their order.
     pub fn done(&self) -> &[Done] {
         &self.file.stages
     }
 
-    /// Records that a further stage is done.
+    /// Records that a further stage is completed.
     ///
     /// # Errors
     /// If the file cannot be written.

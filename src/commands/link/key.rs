@@ -1,4 +1,4 @@
-//! `greylag link key`: makes a key that signs the messages of links.
+//! `greylag link key`: makes a key file for MAVLink message signing.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -12,14 +12,15 @@ use crate::link::signing::Key;
 /// The arguments of `greylag link key`.
 #[derive(Args)]
 pub struct Make {
-    /// New file for the key: 64 hexadecimal digits, readable by its owner alone.
+    /// File to make for the key: 64 hexadecimal digits, readable by its owner alone.
     file: PathBuf,
-    /// Derive the key from a passphrase on standard input, as QGroundControl and MAVProxy do (SHA-256) [default: a random key].
+    /// Read a passphrase from standard input and use its SHA-256 as the key, as QGroundControl and MAVProxy do [default: a
+    /// random key].
     #[arg(long)]
     passphrase: bool,
 }
 
-/// Makes a new key file.
+/// Makes a new key file and prints how to use it.
 ///
 /// # Errors
 /// If the file exists or cannot be written, or standard input holds no passphrase.

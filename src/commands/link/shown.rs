@@ -25,7 +25,8 @@ pub(super) fn latency(real: &Real, out: &mut dyn Write) {
     }
 }
 
-/// Prints how much of the controller's delay margin the delay of the link leaves.
+/// Prints the delay of the control loop and what it leaves of the controller's delay margin. If nothing is left, the reason
+/// is added to `missing`.
 pub(super) fn delay(real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
     if let Some(words) = real.delay_words() {
         print_to!(out, "\ndelay       {words}");

@@ -1,4 +1,7 @@
-//! Trains actor and critics for `greylag train policy --algorithm analytic`.
+//! Training for `greylag train policy --algorithm analytic`.
+//!
+//! It trains an actor and then two critics. The actor is the network of the policy and maps an observation to a command. A
+//! critic is a network that estimates the discounted sum of future rewards (the return).
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,18 +17,19 @@ use crate::learn::{AnalyticRecipe, AnalyticTrainer, Valuation, ValuationRecipe};
 use crate::model::GreyBox;
 use crate::sim::imagined::Imagination;
 
-/// Updates between two evaluations.
+/// Number of updates of the actor between two evaluations.
 const LINE: u64 = 50;
-/// Updates of the critics between two lines of output.
+/// Number of updates of the critics between two printed lines.
 const CRITICS: u64 = 1000;
 
-/// Trains an actor by gradient ascent of the reward in `model`, starting from the actor `from` if one is given. Writes
-/// the learning curve with the results of `judge` into `folder`. Returns the actor of the last update, at which the
-/// learning rate has fallen to a hundredth; `None` if interrupted. An interrupted run starts again, because it takes
-/// only minutes.
+/// Trains an actor by gradient ascent on the reward of flights in `model`, starting from the actor `from` if one is given.
+///
+/// `judge` evaluates an actor. Its results are written into `folder` as the learning curve. The returned actor is that of the
+/// last update and not the best of the curve, because the learning rate has fallen to a hundredth by then. Returns `None` if
+/// interrupted. An interrupted training cannot be resumed, because it takes only minutes.
 ///
 /// # Errors
-/// If a parameter is no longer finite or the curve cannot be written.
+/// If a parameter of the actor is no longer finite, the evaluation fails or the curve cannot be written.
 pub fn climb(
     recipe: &AnalyticRecipe,
     from: Option<&Actor>,
@@ -80,10 +84,10 @@ pub fn climb(
     Ok(Some(Arc::new(trainer.actor()?)))
 }
 
-/// Fits two critics to the returns of `actor` in the environment `world`. `None` if interrupted.
+/// Fits two critics to the returns of `actor` in the environment `world`. Returns `None` if interrupted.
 ///
 /// # Errors
-/// If a parameter is no longer finite.
+/// If the loss is no longer finite or the environment fails.
 pub fn value(
     recipe: ValuationRecipe,
     actor: &Actor,

@@ -17,7 +17,7 @@ const SEED: &str = "seed-";
 /// Options of `greylag train curves`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Folders that `greylag train policy` wrote, each of one seed or of several.
+    /// Output folders of `greylag train policy`, each with one or several seeds.
     #[arg(required = true)]
     folders: Vec<PathBuf>,
     /// Also draw the curves as an HTML page.
@@ -28,7 +28,7 @@ pub struct Arguments {
     force: bool,
 }
 
-/// Prints the results of the trainings and draws their curves.
+/// Prints the results of the trainings and, with `--report`, draws their curves.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = Overwrite::from(arguments.force);
     if let Some(path) = &arguments.report {
@@ -57,7 +57,7 @@ pub fn draw(folder: &Path, page: &Path) -> Result<()> {
     files::write(page, &report.page().render(), Overwrite::Force)
 }
 
-/// The page of `trainings`, which lie in `folders`, in the same order.
+/// The page of `trainings`, which were read from `folders` in the same order.
 fn report<'a>(title: &str, folders: &[PathBuf], trainings: &'a [Training]) -> LearningReport<'a> {
     let seeds = trainings.iter().map(|t| t.seeds.len()).sum::<usize>();
     LearningReport {
@@ -72,7 +72,8 @@ fn report<'a>(title: &str, folders: &[PathBuf], trainings: &'a [Training]) -> Le
     }
 }
 
-/// The command that scores the policy with the smallest error of all seeds.
+/// The command that scores the best policy of all trainings and seeds: the one with the smallest [`CurvePoint::badness`],
+/// the sum of its errors on easy and hard target attitudes.
 fn next(folders: &[PathBuf], trainings: &[Training]) -> String {
     let least = |points: &[CurvePoint]| best(points).map_or(f64::INFINITY, |k| points[k].badness());
     let seeds = folders.iter().zip(trainings).flat_map(|(folder, training)| {
@@ -85,7 +86,7 @@ fn next(folders: &[PathBuf], trainings: &[Training]) -> String {
     })
 }
 
-/// The curves in `folder`, or in the folders of its seeds.
+/// Reads the curve in `folder` or, if there is none, the curves in its subfolders `seed-N`.
 fn training(folder: &Path) -> Result<Training> {
     let name = folder
         .file_name()
@@ -113,7 +114,7 @@ fn training(folder: &Path) -> Result<Training> {
     let mut read = Vec::new();
     for (seed, folder) in seeds {
         let points = learning_curve::read(&folder.join(CURVE))?;
-        // the folder of a training with one seed does not state this seed
+        // the folder of a training with a single seed does not state that seed
         let seed = seed.map_or("–".into(), |seed| seed.to_string());
         if !points.is_empty() {
             read.push((seed, points));

@@ -1,4 +1,6 @@
 //! `greylag train dynamics`: learns a dynamics model from flights.
+//!
+//! The model is the sum of a prior, a physical model that may be wrong, and a residual, a neural network that corrects it.
 
 mod recipe;
 mod tables;
@@ -26,9 +28,9 @@ use tables::{coefficients, horizons, line, shares};
 const LINE: u64 = 500;
 /// Progress lines between two checkpoints.
 const KEEP: u64 = 4;
-/// Horizons of the score, steps.
+/// Horizons at which the prediction errors of the models are computed, steps of 10 ms.
 const HORIZONS: [usize; 4] = [1, 10, 100, 500];
-/// File from which a training is resumed.
+/// Name of the file from which a training is resumed.
 const CHECKPOINT: &str = "checkpoint.safetensors";
 
 /// File name of the training's history, which the report shows.
@@ -50,19 +52,20 @@ pub struct Arguments {
     /// Leave the prior's coefficients as they are (the default).
     #[arg(long, conflicts_with = "trainable")]
     freeze: bool,
-    /// Coefficients to learn with the residual: full names (effect.name, rigid_body.jxz_kgm2) or `all`.
+    /// Coefficients to learn with the residual, the network that corrects the prior: full names (effect.name,
+    /// rigid_body.jxz_kgm2) or `all`.
     #[arg(long, num_args = 1.., value_delimiter = ',', value_name = "NAME")]
     trainable: Vec<String>,
     /// Integrator in place of the prior's: jsbsim for flights of the simulator.
     #[arg(long, value_parser = ["rk4", "jsbsim"])]
     integrator: Option<String>,
-    /// Loss: scaled, as in the paper, or plain (x_c = 1 and an absolute penalty, as in APHYNITY, and with
-    /// --freeze as in PhIHP).
+    /// Loss: scaled, as in the paper, or plain, as in APHYNITY (with --freeze as in PhIHP). Scaled divides the error of each
+    /// state by a characteristic scale x_c and penalises the size of the residual relative to the prior. Plain does neither.
     #[arg(long, default_value = "scaled", value_parser = ["scaled", "plain"])]
     loss: String,
-    /// Weight each rollout by 1/(e² + FLOOR²), where e is the prior's error at its end relative to the
-    /// rms over the rollouts: rollouts with small errors of the prior then count more. With `inf` all
-    /// weights are equal, as in the paper (the default with --loss plain).
+    /// Weight each rollout by 1/(e² + FLOOR²), where e is the prior's error at the end of the rollout, divided by
+    /// the rms of this error over all rollouts. Rollouts with small errors of the prior then count more. With `inf`
+    /// all weights are equal, as in the paper (the default with --loss plain).
     #[arg(long, value_name = "FLOOR")]
     floor: Option<f64>,
     /// Units of the residual's hidden layers.
@@ -100,7 +103,7 @@ pub struct Arguments {
     /// without a standard deviation is fixed.
     #[arg(long)]
     from_scratch: bool,
-    /// λ0 of the penalty's weight 1/λ.
+    /// Initial value λ0 of λ. The size of the residual is penalised with the weight 1/λ.
     #[arg(long, default_value_t = 1.0)]
     lambda: f64,
     /// Factor τ: at each update, λ grows by τ times the normalised loss.
@@ -132,7 +135,7 @@ impl From<Joint> for learn::Joint {
     }
 }
 
-/// The scores as JSON.
+/// Contents of the file `training.json`.
 #[derive(Serialize)]
 struct Document<'a> {
     schema: &'static str,
@@ -153,7 +156,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(learn(arguments, &Interruption::watch()?)?.into())
 }
 
-/// Trains like [`run`] until `stop` is set.
+/// Does the same as [`run`]. If `stop` is set, writes a checkpoint and ends early.
 pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let path = shipped(&arguments.prior);
     let prior = arguments.prior(&path)?;
@@ -215,8 +218,7 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
 }
 
 impl Document<'_> {
-    /// Writes the scores, and the report with its title and subtitle, into `folder`. `prior` is the path of the prior's
-    /// file.
+    /// Writes the JSON file and the report into `folder`. `prior` is the path of the prior's file.
     fn save(&self, folder: &Path, [title, subtitle]: [String; 2], prior: &Path) -> Result<()> {
         let json = folder.join("training.json");
         files::write(&json, &(serde_json::to_string_pretty(self)? + "\n"), Overwrite::Force)?;
@@ -259,8 +261,8 @@ impl Arguments {
         Ok(prior)
     }
 
-    /// `prior`, with a prior standard deviation for each coefficient: the stated one, else 15 % of the value. The model is
-    /// unchanged with `--from-scratch`, or if rounds of `greylag collect` or recent flights are used.
+    /// Returns `prior` with a prior standard deviation for each coefficient: the stated one, else 15 % of the value. The model
+    /// is returned unchanged with `--from-scratch`, or if flights of `greylag collect` or recent flights are used.
     fn narrowed(&self, prior: GreyBox) -> GreyBox {
         if !self.flights.is_logs_alone() || self.from_scratch {
             return prior;
@@ -270,7 +272,8 @@ impl Arguments {
     }
 }
 
-/// `trainer`, resumed from the checkpoint if there is one. Prints the coefficients that the flights do not determine.
+/// Returns `trainer`, resumed from the checkpoint `kept` if there is one. Prints the coefficients that the flights do not
+/// determine.
 fn begun(mut trainer: Trainer, kept: &Path) -> Result<Trainer> {
     for name in trainer.unseen() {
         eprintln!("the flights do not show {name} apart from others: it stays near its prior");
@@ -284,7 +287,8 @@ fn begun(mut trainer: Trainer, kept: &Path) -> Result<Trainer> {
     Ok(trainer)
 }
 
-/// Warning if the learned model is worse than the prior at the longest horizon that both reach.
+/// Warning if the learned model predicts worse than the prior. They are compared at the longest horizon for which a flight is
+/// long enough.
 fn worse([before, after]: &[Vec<Horizon>; 2]) -> Option<String> {
     let farthest = before.iter().zip(after).rfind(|(_, learned)| learned.runs > 0);
     let (before, _) = farthest.filter(|(b, a)| a.rms > b.rms || a.lost > b.lost)?;
@@ -295,7 +299,7 @@ fn worse([before, after]: &[Vec<Horizon>; 2]) -> Option<String> {
     ))
 }
 
-/// Trains to the end. Returns `false` if interrupted. In both cases the last good state is in the checkpoint.
+/// Trains to the end. Returns `false` if interrupted. In both cases the state of the training is in the checkpoint.
 fn train(
     trainer: &mut Trainer,
     kept: &Path,
@@ -328,7 +332,8 @@ fn train(
     Ok(true)
 }
 
-/// History of the training up to `update`; empty if it cannot be read, because the training does not depend on it.
+/// Reads the history of the training up to `update`. The history is empty if it cannot be read, because the training does not
+/// depend on it.
 fn history(path: &Path, update: u64) -> Vec<Moment> {
     let text = std::fs::read_to_string(path).unwrap_or_default();
     let mut history: Vec<Moment> = serde_json::from_str(&text).unwrap_or_default();

@@ -1,4 +1,5 @@
-//! Flights for training: recorded logs, and the rounds of `greylag collect`.
+//! Flights for the training of a model: flight logs, and simulated episodes that `greylag collect` recorded in rounds. A track
+//! is a section of a flight without gaps. Held-out data are used for validation only.
 
 use std::path::{Path, PathBuf};
 
@@ -13,10 +14,10 @@ use crate::physics::{Controls, State};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
-/// One in this many tracks is held out for validation, if there are at least that many.
+/// Without recent flights, every tenth track is held out, if there are ten or more.
 const HELD_OUT: usize = 10;
-/// Fraction at the end of a flight that is held out for validation: of each recent flight, or of each flight if there
-/// are fewer than `HELD_OUT` tracks.
+/// Fraction at the end of a track that is held out: of each track of recent flights, or, without recent flights, of each
+/// track if there are fewer than `HELD_OUT`.
 const HELD_OUT_PART: f64 = 0.2;
 /// Largest number of copies of a recent flight in the training data.
 const MOST_COPIES: f64 = 50.0;
@@ -29,14 +30,15 @@ pub struct FlightArguments {
     logs: Vec<PathBuf>,
     #[command(flatten)]
     reading: Reading,
-    /// Folders that `greylag collect` wrote; every round below them is read, and its states are not reconstructed.
+    /// Folders that `greylag collect` wrote. Every round in them is read, with the recorded states as they are.
     #[arg(long = "collect", num_args = 1..)]
     folders: Vec<PathBuf>,
-    /// Logs of recent flights, which outweigh the others; the last fifth of each is for validation and is not used for
-    /// training.
+    /// Logs of recent flights, which get a larger weight than the others (--recent-share). The last fifth of each is held out
+    /// for validation.
     #[arg(long = "recent", value_name = "LOG", num_args = 1..)]
     recent: Vec<PathBuf>,
-    /// Fraction of the training samples that come from recent flights, which are repeated for this; 1 omits the other flights.
+    /// Fraction of the training samples that come from recent flights. To reach it, recent flights are repeated, at most 50
+    /// times; 1 leaves the other flights out.
     #[arg(long, value_name = "PART", default_value_t = 0.5, requires = "recent", value_parser = share)]
     recent_share: f64,
 }
@@ -45,26 +47,26 @@ pub struct FlightArguments {
 pub struct Flights {
     /// Tracks for training.
     pub learn: Vec<Track>,
-    /// Tracks for validation, which are held out of the training.
+    /// Tracks for validation, which are not used for training.
     pub judge: Vec<Track>,
-    /// Number of training samples, each counted once.
+    /// Number of training samples. Samples of repeated flights are counted once.
     pub samples: usize,
-    /// Time between samples of the slowest log, s.
+    /// Longest sample time of the logs, s; at least the model's time step.
     pub slowest_s: f64,
     /// Notes for the reader of the report.
     pub notes: Vec<String>,
 }
 
-/// Number of samples that are held out at the end of a flight of `samples` samples.
+/// Number of samples that are held out at the end of a track of `samples` samples.
 fn held_out(samples: usize) -> usize {
     (HELD_OUT_PART * samples as f64) as usize
 }
 
 impl FlightArguments {
-    /// Reads the flights, with effective controls and air density from `model`.
+    /// Reads the flights. `model` converts the measured controls to those that act on the aircraft, and gives the air density.
     ///
     /// # Errors
-    /// If no flights are given, or a file cannot be read.
+    /// If there are no flights, a file cannot be read, or a log has fewer than ten samples per second.
     pub fn read(&self, model: &GreyBox) -> Result<Flights> {
         let mut notes = Vec::new();
         let mut tracks = Vec::new();
@@ -97,12 +99,13 @@ impl FlightArguments {
         Ok(Flights { samples: samples(&learn), learn, judge, slowest_s, notes })
     }
 
-    /// Whether all flights are ordinary logs: there are no rounds of `greylag collect` and no recent flights.
+    /// Whether all flights come from `--log`: there are no folders of `greylag collect` and no recent flights.
     pub fn is_logs_alone(&self) -> bool {
         self.folders.is_empty() && self.recent.is_empty()
     }
 
-    /// The rows (state, controls, altitude) of each section of `logs` without gaps, resampled to the model's step.
+    /// The rows (state, controls, altitude) of each section of `logs` without gaps, resampled to the model's time step. Adds
+    /// to `notes`, and raises `slowest_s` to the longest sample time of `logs`, s.
     fn logged(
         &self,
         logs: &[PathBuf],
@@ -127,8 +130,8 @@ impl FlightArguments {
         Ok(all)
     }
 
-    /// Joins the tracks `others` and the recent flights. Recent flights are repeated until they make up the requested
-    /// fraction of all samples.
+    /// The training and validation data if there are recent flights. The training data are the tracks `others` and the recent
+    /// flights. These are repeated until they make up about the requested fraction of all samples.
     fn with_recent(
         &self,
         others: Vec<Track>,
@@ -166,10 +169,10 @@ impl FlightArguments {
     }
 }
 
-/// Parses the value of an option that is a fraction of all samples.
+/// Parses `text`, the value of an option that is a fraction of the training samples.
 ///
 /// # Errors
-/// If it is not a number above 0 and at most 1.
+/// If the text is no number above 0 and at most 1.
 pub fn share(text: &str) -> Result<f64, String> {
     let share = text.parse().ok().filter(|share| *share > 0.0 && *share <= 1.0);
     share.ok_or_else(|| "give a number above 0, at most 1".into())
@@ -178,10 +181,10 @@ pub fn share(text: &str) -> Result<f64, String> {
 /// A sample: state, measured controls, altitude (m).
 type Row = (State, Controls, f64);
 
-/// Warning for a flight whose sample time exceeds the model's time step. `None` for other flights.
+/// A warning if the flight's sample time exceeds the model's time step; otherwise `None`.
 ///
 /// # Errors
-/// If its sample time exceeds `SLOWEST_S`.
+/// If the sample time exceeds [`SLOWEST_S`].
 fn slow(flight: &Reconstruction) -> Result<Option<String>> {
     let (name, step_s) = (&flight.name, flight.step_s);
     if step_s > 1.001 * SLOWEST_S {
@@ -198,7 +201,7 @@ fn slow(flight: &Reconstruction) -> Result<Option<String>> {
     Ok((step_s > 1.001 * STEP).then_some(note))
 }
 
-/// The episodes below a folder of `greylag collect`, in the order of their names.
+/// The episodes in the subfolders (rounds) of `folder`, which `greylag collect` wrote, in the order of their names.
 fn collected(folder: &Path, model: &GreyBox) -> Result<Vec<Track>> {
     let list = |folder: &Path| -> Result<Vec<PathBuf>> {
         let entries = std::fs::read_dir(folder).with_context(|| {

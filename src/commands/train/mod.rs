@@ -23,7 +23,8 @@ pub struct Arguments {
 
 #[derive(clap::Subcommand)]
 enum What {
-    /// Learn a dynamics model: a residual for what the prior lacks, and coefficients of the prior if requested.
+    /// Learn a dynamics model: a neural network for the part of the motion that the prior model does not explain, and with
+    /// --trainable also coefficients of the prior.
     Dynamics(Box<dynamics::Arguments>),
     /// Train a policy in a model, or in JSBSim.
     Policy(Box<policy::Arguments>),
@@ -31,7 +32,7 @@ enum What {
     Curves(curves::Arguments),
 }
 
-/// Runs the chosen training until `stop` is set. Drawing curves is an error.
+/// Runs the chosen training until it ends or `stop` is set. The subcommand `curves` is an error, because it trains nothing.
 pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     match &arguments.what {
         What::Dynamics(arguments) => dynamics::learn(arguments, stop),
@@ -40,7 +41,7 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     }
 }
 
-/// Runs the chosen training.
+/// Runs the chosen subcommand of `greylag train`.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.what {
         What::Dynamics(arguments) => dynamics::run(arguments),

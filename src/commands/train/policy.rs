@@ -1,4 +1,8 @@
 //! `greylag train policy`: trains a policy in a model or in JSBSim.
+//!
+//! A policy is a neural network (the actor) that maps an observation to a command. Critics are networks that estimate the
+//! discounted sum of future rewards. The algorithm is TD3, or the analytic policy gradient: the gradient of the reward
+//! through the model over short windows of flight.
 
 mod ground;
 mod recipe;
@@ -27,105 +31,106 @@ use crate::sim::targets::Stratified;
 use ground::Ground;
 use run::Run;
 
-/// File name of the page of the learning curves.
+/// Name of the HTML file with the learning curves.
 const REPORT: &str = "policy.html";
 
 /// Options of `greylag train policy`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Where to train: model:DIR, model:FILE.toml, or jsbsim.
+    /// Environment of the training: model:DIR, model:FILE.toml, or jsbsim.
     #[arg(long = "env", value_name = "ENV")]
     environment: Place,
     /// Algorithm: td3, or analytic (policy gradient through the model, then critics fitted to the resulting actor).
     #[arg(long, default_value = "td3", value_parser = ["td3", "analytic"])]
     algorithm: String,
-    /// Updates of the critics, which are fitted after the analytic policy gradient.
+    /// Number of updates of the critics that are fitted after the analytic policy gradient.
     #[arg(long, default_value_t = ValuationRecipe::default().updates, value_parser = clap::value_parser!(u64).range(1..))]
     valuation: u64,
-    /// Updates of the analytic policy gradient.
+    /// Number of updates of the analytic policy gradient.
     #[arg(long, default_value_t = AnalyticRecipe::default().updates)]
     updates: u64,
-    /// Steps of a window of the analytic policy gradient.
+    /// Number of steps in a window, the stretch of flight over which the analytic policy gradient is taken.
     #[arg(long, default_value_t = AnalyticRecipe::default().window as u64, value_parser = clap::value_parser!(u64).range(1..=1000))]
     window: u64,
-    /// Aircraft flown in parallel for an update of the analytic policy gradient.
+    /// Number of aircraft that fly in parallel for one update of the analytic policy gradient.
     #[arg(long, alias = "flock", default_value_t = AnalyticRecipe::default().instances as u64, value_parser = clap::value_parser!(u64).range(1..=4096))]
     gradient_batch: u64,
-    /// Learning rate of the analytic policy gradient at the start.
+    /// Initial learning rate of the analytic policy gradient.
     #[arg(long, default_value_t = AnalyticRecipe::default().rate)]
     climb: f64,
-    /// Errors of roll and pitch (rad) below which the analytic policy gradient smooths the reward.
+    /// Error of roll or pitch (rad) or airspeed (m/s) below which the analytic policy gradient smooths the reward.
     #[arg(long, default_value_t = AnalyticRecipe::default().rounding)]
     rounding: f64,
-    /// Weight of the squared change of the commands from step to step in the analytic policy gradient.
+    /// Weight of the squared change of the commands per step in the objective of the analytic policy gradient.
     #[arg(long, default_value_t = AnalyticRecipe::default().effort)]
     effort: f64,
-    /// Aircraft simulated at once in the model.
+    /// Number of aircraft that are simulated in parallel in the model, for TD3 and for the fit of the critics.
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u64).range(1..=4096))]
     instances: u64,
-    /// Number of policies to train, with consecutive seeds from --seed on; they share the cores.
+    /// Number of policies to train in parallel, with consecutive seeds that start at --seed.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
     /// Seed of the first policy.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Steps of the environment, all aircraft together; there is one update per step.
+    /// Number of steps of TD3, counted over all aircraft; after the warm-up there is one update per step.
     #[arg(long, default_value_t = 700_000)]
     steps: u64,
-    /// Steps of random actions at the start.
+    /// Number of steps with random actions at the start of TD3 (warm-up), without updates.
     #[arg(long, default_value_t = 10_000)]
     warmup: u64,
-    /// Capacity of the replay buffer, transitions.
+    /// Capacity of the replay buffer of TD3 in steps.
     #[arg(long, default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(1..))]
     replay: u64,
     /// Folder of a policy whose actor is trained further by the analytic policy gradient; its
     /// layers replace --actor.
     #[arg(long, value_name = "DIR")]
     start: Option<PathBuf>,
-    /// Units of the actor's hidden layers.
+    /// Numbers of units of the actor's hidden layers.
     #[arg(long, value_delimiter = ',', default_values_t = [300, 300])]
     actor: Vec<usize>,
-    /// Units of a critic's hidden layers.
+    /// Numbers of units of a critic's hidden layers.
     #[arg(long, value_delimiter = ',', default_values_t = [200, 200, 200])]
     critic: Vec<usize>,
-    /// Rows of a minibatch.
+    /// Number of steps in a minibatch of TD3.
     #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u64).range(1..))]
     batch: u64,
-    /// Rate τ of the soft update of the target networks.
+    /// Rate τ of the soft update of the target networks of TD3.
     #[arg(long, default_value_t = 0.05)]
     tau: f64,
-    /// Learning rate of actor and critics.
+    /// Learning rate of actor and critics in TD3.
     #[arg(long, default_value_t = 3e-4)]
     rate: f64,
     /// Discount factor per step.
     #[arg(long, default_value_t = 0.99)]
     discount: f64,
-    /// Standard deviation of the exploration noise.
+    /// Standard deviation of the exploration noise of TD3, where commands range from -1 to 1.
     #[arg(long, default_value_t = 0.1)]
     exploration: f64,
     /// Standard deviation of the noise that smooths the target policy of TD3.
     #[arg(long, default_value_t = 0.2)]
     smoothing: f64,
-    /// Fraction of the targets that lie in the hard corners, 0 to 1; 0 as in the paper.
+    /// Fraction (0 to 1) of the commanded attitudes that lie in the hard corners (45° to 60° of roll with 25° to 30° of pitch);
+    /// the paper has 0.
     #[arg(long, default_value_t = 0.0)]
     corners: f64,
-    /// Models, drawn from the prior distributions of the coefficients of --env, in which the analytic policy gradient flies
-    /// (domain randomisation); 0: the model itself. The critics are always fitted in the model itself.
+    /// Number of models in which the analytic policy gradient flies (domain randomisation). They are drawn from the prior
+    /// distributions of the coefficients of the --env model; with 0 it flies in that model itself, as the critics always do.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4096))]
     draws: u64,
-    /// Steps between two evaluations, flown in the training's simulation.
+    /// Number of steps of TD3 between two evaluations, which fly in the environment of the training.
     #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..))]
     evaluate: u64,
-    /// Steps between two checkpoints.
+    /// Number of steps between two checkpoints of TD3.
     #[arg(long, default_value_t = 50_000, value_parser = clap::value_parser!(u64).range(1..))]
     checkpoint: u64,
-    /// Folder for the policy, its learning curve and the checkpoint (seed-N below it for several
-    /// seeds); a training found there is resumed.
+    /// Folder for the policy, its learning curve and the checkpoint (with several seeds, its
+    /// subfolders seed-N); TD3 resumes from a checkpoint found there.
     #[arg(long)]
     out: PathBuf,
 }
 
-/// Simulation in which a policy is trained.
+/// Environment in which a policy is trained: a model file or its folder, or JSBSim.
 #[derive(Clone, Debug)]
 enum Place {
     Model(PathBuf),
@@ -143,7 +148,8 @@ impl FromStr for Place {
     }
 }
 
-/// Trains the policies, prints their learning curves and writes the best policy of each seed.
+/// Trains the policies, prints their learning curves and writes one policy per seed. With TD3 it is the best policy of the
+/// evaluations, with the analytic gradient the last one.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(learn(arguments, &Interruption::watch()?)?.into())
 }
@@ -163,7 +169,7 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let seeds = arguments.seed..end;
     println!("{:>8} {COLUMNS}", "seed");
     let one = |seed: u64| arguments.train(&ground, seed, stop);
-    // a scheduler limits the number of cores by RAYON_NUM_THREADS
+    // the same number of threads as rayon's global pool, which a scheduler limits by RAYON_NUM_THREADS
     let pool = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads()).build()?;
     use rayon::prelude::*;
     let seeds: Vec<u64> = seeds.collect();
@@ -171,7 +177,7 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let page = arguments.out.join(REPORT);
     match curves::draw(&arguments.out, &page) {
         Ok(()) => println!("report in {}", page.display()),
-        // a training that failed at its start has reported its error
+        // there are no curves because the training failed, and its error is returned below
         Err(error) if ended.is_ok() => eprintln!("no learning curves were drawn: {error:#}"),
         Err(_) => (),
     }
@@ -184,7 +190,7 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
 }
 
 impl Arguments {
-    /// Note on what the same command does after an interruption.
+    /// What the same command does after an interruption, for a message to the user.
     fn next_time(&self) -> &'static str {
         match self.is_analytic() {
             true => "begins this policy anew",
@@ -251,7 +257,7 @@ impl Arguments {
         Ok(Ground { model: Some(Arc::new(model)), origin, airframe })
     }
 
-    /// The actor from which the training starts; `None` without `--start`.
+    /// The actor of the policy in `--start`, from which the training starts; `None` without this option.
     fn started(&self, airframe: &Airframe) -> Result<Option<Arc<Actor>>> {
         let load = |folder: &PathBuf| -> Result<Arc<Actor>> {
             let agent = Agent::load(folder, airframe).with_context(|| {

@@ -1,8 +1,9 @@
 //! Control power, damping and stiffness of one axis of an unknown aircraft, estimated in flight.
 //!
 //! The method is recursive least squares with a prior (a Kalman filter over constants, K. J. Åström, B. Wittenmark,
-//! "Adaptive Control", 2nd ed., 1995, section 2.2). The regression is ω̇ = b u − a ω − m α̂, with the body rate ω, the command
-//! u, the estimated angle of attack α̂, the control power b, the damping a and the stiffness m. Both sides are
+//! "Adaptive Control", 2nd ed., 1995, section 2.2). The regression at cruise is ω̇ = b u − a ω − m α̂, with the body rate ω,
+//! the command u behind an assumed servo, the estimated change α̂ of the angle of attack, the control power b, the damping a
+//! and the stiffness m. At other airspeeds u and α̂ are multiplied by (V/V_cruise)² and ω by V/V_cruise. Both sides are
 //! differentiated and pass the same low-pass filters. The differentiation removes constant and slow influences (trim, wind,
 //! asymmetry).
 
@@ -12,13 +13,13 @@ use greylag_model::STEP;
 const CORNER: f64 = 20.0;
 /// Corner frequencies of two first-order lags that approximate an unknown servo and an unknown delay, rad/s.
 const SERVO: [f64; 2] = [25.0, 40.0];
-/// Standard deviation of the part of the regression's error that does not depend on the signals, 1/s². Its product with V/g at
-/// cruise (s) has the unit of the regression's left side.
+/// `NOISE` g/V (1/s³, at the cruise airspeed V) is the standard deviation of the part of the regression's error that does not
+/// depend on the signals. `NOISE` is in 1/s².
 const NOISE: f64 = 4.0;
-/// Standard deviation of the regression's relative error, as a fraction of the left side. It covers servos and delays that
-/// differ from the assumed ones.
+/// Standard deviation of the other part of the error, as a fraction of the regression's left side. It covers servos and delays
+/// that differ from the assumed ones.
 const SHARE: f64 = 0.2;
-/// Growth rate of each variance by forgetting, as a fraction of the prior variance, 1/s.
+/// Growth rate of each variance below its prior value (forgetting), as a fraction of the prior variance, 1/s.
 const AGEING: f64 = 1e-3;
 
 /// Prior of control power, damping and stiffness of an axis. The units are (g/V)², g/V and (g/V)², with the standard gravity g
@@ -49,7 +50,7 @@ pub(super) struct Seen {
     pub rate: f64,
     /// Command that acts at this instant, −1..1. A positive command accelerates the axis to positive rates.
     pub command: f64,
-    /// Estimated change of the angle of attack, rad. Zero for the roll axis, which has no stiffness.
+    /// Estimated deviation of the angle of attack from trim, rad. Zero for the roll axis, which has no stiffness.
     pub incidence: f64,
     /// Airspeed divided by the cruise airspeed.
     pub speed: f64,
@@ -89,8 +90,7 @@ impl Estimate {
         self.learn(x, bend * time * time, NOISE * time);
     }
 
-    /// One step of recursive least squares for `y` = θ·`x`. The standard deviation of the error is `noise`, to which the relative
-    /// error `SHARE` is added.
+    /// One step of recursive least squares for `y` = θ·`x`. The variance of the error is `noise`² + (`SHARE` `y`)².
     fn learn(&mut self, x: [f64; 3], y: f64, noise: f64) {
         let dot = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let spread: [f64; 3] = std::array::from_fn(|k| dot(&self.covariance[k], &x));
@@ -130,8 +130,8 @@ mod tests {
         estimate.theta[0]
     }
 
-    /// The true powers are 120 and 800, the prior is 400. The regression omits one step of delay, which biases the
-    /// estimates by about a fifth.
+    /// The true control powers are 120 and 800 (g/V)², the prior mean is 400. The regression neglects one step of delay, which
+    /// biases the estimates by about a fifth.
     #[test]
     fn the_power_of_an_axis_is_found_in_five_seconds() {
         for (power, damping) in [(30.0, 6.0), (200.0, 8.0)] {

@@ -1,10 +1,11 @@
 //! Adaptive attitude hold for an aircraft without a model. The gains of its cascaded loops are divided by control powers
 //! that are estimated in flight. The controller needs two facts: the cruise airspeed, and whether the aircraft has a rudder.
 //!
-//! Times and rates are scaled by V/g at the cruise airspeed V (Froude scaling). One set of gains therefore serves small
-//! models and light aircraft. The prior means are medians over a distribution of aircraft (`greylag aircraft draw`), except
-//! the mean of the roll control power. The gains were tuned on aircraft drawn from this distribution, see
-//! `docs/validation/any-aircraft.md`.
+//! Control power is the angular acceleration at full deflection. The priors, the lift slope and the gains of throttle and
+//! rudder are in units of V/g, where V is the cruise airspeed (Froude scaling). One set of constants therefore serves small
+//! models and light aircraft. The means of the priors are medians over a distribution of aircraft (`greylag aircraft draw`),
+//! except the mean of the roll control power. The gains were tuned on aircraft drawn from this distribution
+//! (`docs/validation/any-aircraft.md`).
 
 mod estimate;
 
@@ -14,13 +15,12 @@ use greylag_model::STEP;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{Airframe, Command};
 
-/// Prior of the roll axis. Its mean is twice the median control power, because a loop gain that is too low costs less than
-/// one that is too high.
+/// Prior of control power, damping and stiffness of the roll axis, in the units of [`Prior`]. The mean of the control power is
+/// twice the median of the distribution, because a loop gain that is too low costs less than one that is too high.
 const ROLL: Prior = Prior { mean: [400.0, 15.0, 0.0], sd: [250.0, 10.0, 1e-6], least: 25.0 };
-/// Prior of the pitch axis.
+/// Prior of control power, damping and stiffness of the pitch axis, in the units of [`Prior`].
 const PITCH: Prior = Prior { mean: [300.0, 10.0, 40.0], sd: [200.0, 7.0, 50.0], least: 10.0 };
-/// Lift slope −Z_α, in g/V. It is nearly the same for all aircraft, because they cruise at about half of the largest lift
-/// coefficient.
+/// Lift slope −Z_α at cruise, in g/V. In this unit it is about CLα / CL, which differs little between aircraft.
 const LIFT_SLOPE: f64 = 9.0;
 
 /// Gains from the roll error to the commanded roll rate and from the pitch error to the commanded pitch rate, 1/s.
@@ -29,12 +29,12 @@ const ATTITUDE: [f64; 2] = [3.0, 2.4];
 const RATE: f64 = 6.0;
 /// Ratio of the integral gain to the proportional gain of the rate loops, 1/s.
 const INTEGRAL: f64 = 3.5;
-/// Limit of the integral's part of the command, where 1 is full travel.
+/// Largest magnitude of the integral's part of the command, where 1 is full travel.
 const INTEGRAL_MOST: f64 = 0.8;
-/// Fraction of the estimated stiffness that is used in the feed-forward.
+/// Fraction of the estimated pitch stiffness that the feed-forward of the elevator uses.
 const STIFFNESS_SHARE: f64 = 0.7;
-/// Largest roll and pitch rates of the reference attitude, rad/s. `ROUNDING` is the time constant with which the reference
-/// approaches the target, s.
+/// Largest roll and pitch rates of the reference attitude, rad/s. The reference is the commanded attitude after a rate limit and
+/// a first-order lag with the time constant `ROUNDING`, s.
 const REFERENCE: [f64; 2] = [0.9, 0.5];
 const ROUNDING: f64 = 0.35;
 
@@ -45,13 +45,13 @@ const THROTTLE: [f64; 4] = [0.4, 1.5, 0.8, 1.2];
 /// [`NOSE_DOWN`] (rad) below the horizon.
 const SLOW: [f64; 2] = [0.80, 0.65];
 const NOSE_DOWN: f64 = 0.15;
-/// Gain to the rudder command from the difference between the yaw rate and that of a coordinated turn, in V/g.
-/// `RUDDER_MOST` is the largest rudder command.
+/// Gain of the rudder command on the yaw rate minus the yaw rate of a coordinated turn, in V/g. `RUDDER_MOST` is the largest
+/// magnitude of the rudder command.
 const YAW_DAMPING: f64 = 0.25;
 const RUDDER_MOST: f64 = 0.5;
 
-/// Estimate of the aircraft at its cruise airspeed. The control powers are effective values over about a tenth of a second. A
-/// slow servo or a delay reduces them below the aerodynamic values.
+/// Estimated properties of the aircraft at its cruise airspeed. The control powers are effective values over about a tenth of a
+/// second. A slow servo or a delay reduces them below the aerodynamic values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Belief {
     /// Roll acceleration at full aileron, rad/s².
@@ -66,7 +66,7 @@ pub struct Belief {
     pub pitch_stiffness: f64,
 }
 
-/// Estimate and rate-loop integral of one axis.
+/// Estimate of one axis, and the integral of its rate loop as a part of the command.
 #[derive(Clone, Debug)]
 struct Axis {
     estimate: Estimate,
@@ -78,8 +78,9 @@ impl Axis {
         Axis { estimate: Estimate::new(prior), integral: 0.0 }
     }
 
-    /// The command (−1..1) that drives `rate` to the setpoint `wanted` (rad/s). `feed` maps damping (1/s) and stiffness (1/s²) to
-    /// the acceleration (rad/s²) that is needed to hold the setpoint. `speed` and `time` are those of `Seen`.
+    /// Computes the command (−1..1) that drives the body rate `rate` to its setpoint `wanted` (rad/s). `feed` maps damping (1/s)
+    /// and stiffness (1/s²) to the acceleration (rad/s²) that is needed to hold the setpoint. `speed` and `time` are those of
+    /// [`Seen`].
     fn command(
         &mut self,
         [rate, wanted]: [f64; 2],
@@ -105,18 +106,18 @@ impl Axis {
 /// The adaptive attitude controller of one aircraft.
 #[derive(Clone, Debug)]
 pub struct Adaptive {
-    /// Cruise airspeed, m/s.
+    /// Cruise airspeed of the aircraft, m/s.
     cruise: f64,
     rudder: bool,
     reference: Option<[f64; 2]>,
     axes: [Axis; 2],
-    /// Estimated change of the angle of attack, rad.
+    /// Estimated deviation of the angle of attack from that of steady flight, rad.
     incidence: f64,
     thrust: f64,
 }
 
 impl Adaptive {
-    /// A controller of the aircraft with `airframe`, from which only the cruise airspeed and the rudder's presence are used.
+    /// A controller for the aircraft of `airframe`. Only its cruise airspeed and the presence of a rudder are used.
     pub fn new(airframe: &Airframe) -> Adaptive {
         Adaptive {
             cruise: airframe.envelope.airspeed_cruise_mps,
@@ -128,7 +129,7 @@ impl Adaptive {
         }
     }
 
-    /// The present estimate of the aircraft.
+    /// The present estimate of the aircraft's properties.
     pub fn belief(&self) -> Belief {
         let time = self.cruise / STANDARD_GRAVITY;
         let [roll, pitch] = [0, 1].map(|k| self.axes[k].estimate.theta);
@@ -153,7 +154,7 @@ impl Adaptive {
                 reference[k] += rate * STEP;
             }
         }
-        // a reference that started at an unknown attitude starts again at the next tick
+        // a reference that is not finite is discarded: the next tick starts again at the attitude of that tick
         self.reference = Some(reference).filter(|x| x.iter().all(|x| x.is_finite()));
         [reference, rates]
     }
@@ -170,8 +171,8 @@ impl Adaptive {
     }
 }
 
-/// Roll and pitch setpoints (rad) of the reference. At low airspeed, as `SLOW` defines, the nose is lowered and the bank is
-/// reduced.
+/// The setpoints of roll and pitch (rad) that the reference follows. At low airspeed the nose is lowered and the bank is reduced,
+/// see `SLOW`. `speed` is the airspeed divided by the cruise airspeed.
 fn wanted(target: &Target, speed: f64) -> [f64; 2] {
     let slow = ((SLOW[0] - speed) / (SLOW[0] - SLOW[1])).clamp(0.0, 1.0);
     let lower = target.pitch * (1.0 - slow) - slow * NOSE_DOWN;
@@ -200,7 +201,7 @@ impl Controller for Adaptive {
         let speed = (state.airspeed / self.cruise).clamp(0.3, 3.0);
         let (sin, cos) = state.roll.sin_cos();
         let level = state.pitch.cos();
-        // turn rate of a coordinated turn about the vertical, rad/s
+        // rate of heading in a coordinated turn, rad/s
         let turn = state.roll.clamp(-1.2, 1.2).tan() * level / (speed * time);
         let slope = LIFT_SLOPE * speed / time;
         let pull = turn * sin * level;

@@ -1,7 +1,6 @@
 //! One recurrent policy for all fixed-wing aircraft: a gated recurrent unit (GRU). It was trained with analytic gradients
-//! through simulated flights of aircraft drawn from a distribution (`params/any/train.py`). Like
-//! [`adaptive`](crate::adaptive) it needs the cruise airspeed and whether the aircraft has a rudder. Its recurrent state
-//! adapts to all other properties in flight.
+//! through simulated flights of aircraft drawn from a distribution (`params/any/train.py`). Of the aircraft it is given the
+//! cruise airspeed and whether there is a rudder. Its recurrent state adapts to all other properties in flight.
 
 mod network;
 
@@ -11,14 +10,13 @@ use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{Airframe, Command};
 use network::{HIDDEN, INPUTS, Network};
 
-/// Largest roll and pitch rates of the reference attitude, rad/s. `ROUNDING` is the time constant with which the reference
-/// approaches the target, s. The policy was trained with both values (`params/any/train.py`), which therefore change only
-/// with a new training.
+/// Largest roll and pitch rates of the reference attitude, rad/s. The reference attitude approaches the target with the time
+/// constant `ROUNDING`, s. The policy was trained with both values (`params/any/train.py`). A change needs a new training.
 const REFERENCE: [f64; 2] = [0.9, 0.5];
 const ROUNDING: f64 = 0.35;
-/// Largest magnitude of the integrals of the attitude errors, rad s. `SPEED_INTEGRAL_MOST` is that of the relative airspeed
-/// error, s.
+/// Largest magnitude of the integrals of the attitude errors, rad s.
 const INTEGRAL_MOST: f64 = 0.5;
+/// Largest magnitude of the integral of the airspeed error as a fraction of the cruise airspeed, s.
 const SPEED_INTEGRAL_MOST: f64 = 2.0;
 
 /// State of the policy between two steps.
@@ -57,7 +55,8 @@ impl AnyPolicy {
         })
     }
 
-    /// Inputs of the network in the order used in training, and the policy's state with reference and integrals after this step.
+    /// Inputs of the network in the order used in training, and the policy's state after this step. Reference attitude and
+    /// integrals of that state are new, the recurrent state is unchanged.
     fn see(&self, seen: &Observation, target: &Target) -> ([f64; INPUTS], Memory) {
         let (s, u, mut memory) = (&seen.state, &seen.previous[0], self.memory);
         let time = self.cruise / STANDARD_GRAVITY;
@@ -76,7 +75,7 @@ impl AnyPolicy {
         memory.speed_integral = (memory.speed_integral + (1.0 - speed) * STEP)
             .clamp(-SPEED_INTEGRAL_MOST, SPEED_INTEGRAL_MOST);
         let (sin, cos) = s.roll.sin_cos();
-        // rate of a coordinated turn about the vertical, then about the body's y and z axes, rad/s
+        // yaw rate of a coordinated turn about the vertical, then its components about the body's y and z axes, rad/s
         let turn = s.roll.clamp(-1.2, 1.2).tan() * s.pitch.cos() / (speed * time);
         let [pull, swing] = [sin, cos].map(|part| turn * part * s.pitch.cos());
         let inputs = [

@@ -1,4 +1,5 @@
-//! The network of the policy for all aircraft: a GRU with a linear path from the inputs to the outputs in parallel.
+//! The network of the policy that flies any aircraft: a recurrent layer (GRU), and in parallel a linear path from the inputs
+//! to the outputs.
 
 use std::sync::LazyLock;
 
@@ -10,9 +11,10 @@ use crate::SetupError;
 pub(super) const INPUTS: usize = 24;
 /// Number of recurrent units.
 pub(super) const HIDDEN: usize = 32;
-/// Number of outputs: aileron, elevator, throttle, rudder, each −1..1.
+/// Number of outputs, each −1..1: aileron, elevator, throttle and rudder. The throttle output −1..1 stands for a throttle of
+/// 0..1.
 const OUTPUTS: usize = 4;
-/// Number of gate rows: update, reset and candidate of each unit.
+/// Number of rows of the GRU's matrices: one row per unit for the update gate, the reset gate and the candidate state.
 const GATES: usize = 3 * HIDDEN;
 
 static FILE: &[u8] = include_bytes!("../../../params/any/policy.safetensors");
@@ -29,7 +31,7 @@ pub(super) struct Network {
     output_bias: Vec<f64>,
 }
 
-/// The network that the program ships.
+/// The network that is built into the program.
 pub(super) fn shipped() -> Result<&'static Network, SetupError> {
     SHIPPED.as_ref().map_err(|why| SetupError::Any { why: why.clone() })
 }
@@ -96,7 +98,7 @@ impl Network {
 mod tests {
     use super::*;
 
-    /// The file holds inputs and outputs of five steps of the training program, in single precision.
+    /// The file holds the inputs and commands of five steps, computed by the training program.
     #[test]
     fn the_network_is_the_one_that_was_trained() {
         let text = include_str!("../../../tests/data/any/policy.trace.csv");
@@ -108,7 +110,7 @@ mod tests {
                 network.step(&mut hidden, x.try_into().unwrap());
             let ours = [aileron, elevator, 0.5 + 0.5 * throttle, rudder];
             for (ours, theirs) in ours.iter().zip(u) {
-                // the outputs are single precision, the inputs have six decimals
+                // the recorded outputs have single precision, the recorded inputs six decimals
                 assert!((ours - theirs).abs() < 1e-5, "step {steps}: {ours} {theirs}");
             }
             steps += 1;

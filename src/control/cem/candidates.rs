@@ -1,4 +1,5 @@
-//! Display of the last planning tick: a sample of its candidates, each simulated with the model.
+//! Data for the display of the planner's last search: the attitudes along a sample of the candidate plans, simulated with
+//! the model. The base controller is the LQI that flies where no plan is better; a planner may have none.
 
 use super::rollout::{HORIZON, WIDTH, slewed};
 use super::{Cem, Plan, flown};
@@ -12,8 +13,8 @@ use greylag_physics::actuators::Actuators;
 const SHOWN: usize = 48;
 
 impl Cem {
-    /// The candidates and the chosen plan of the tick that was planned from `seen`. The function integrates several thousand
-    /// steps and allocates memory. It is therefore not for use in flight.
+    /// Returns the simulated paths of a sample of the candidates and of the chosen plan. `seen` is the observation from which
+    /// they were planned. The function integrates several thousand steps and allocates memory, so it is not for use in flight.
     pub(super) fn last_insight(&self, seen: &Observation) -> Insight {
         let all = self.blocks.len() * WIDTH;
         let every = all.div_ceil(SHOWN).max(1);
@@ -26,7 +27,8 @@ impl Cem {
         }
     }
 
-    /// Roll and pitch (rad) at every step along `plan`. Without a plan, the simulated aircraft is flown by the base controller.
+    /// Roll and pitch (rad) at every step along `plan`. The base controller, if there is one, flies the steps after the end of
+    /// the plan, and all steps if `plan` is `None`.
     fn path(&self, seen: &Observation, plan: Option<&Plan>) -> Path {
         let model = &self.model;
         let figures = &model.airframe.actuators;

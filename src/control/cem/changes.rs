@@ -1,4 +1,7 @@
-//! Overrides of single planner settings, as `KEY=VALUE` on a command line.
+//! Changes of single settings of the planner, given as `KEY=VALUE` on a command line.
+//!
+//! The planner is a sampling MPC. In each tick (10 ms) it draws candidates, which are sequences of commands, simulates them with
+//! the model and fits the distribution of the next candidates to the best ones, the elites.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,52 +9,54 @@ use std::str::FromStr;
 use super::rollout::{HORIZON, WIDTH};
 use super::settings::{Instructions, Settings, Start, Update, Value};
 
-/// One planner setting that replaces its default, parsed from `KEY=VALUE`.
+/// A value that replaces the default of one planner setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Change {
-    /// Replaces [`Settings::population`], the candidates per iteration.
+    /// Replaces [`Settings::population`], the number of candidates per iteration.
     Population(usize),
     /// Replaces the number of elites, see [`Update::Elites`].
     Elites(usize),
-    /// Replaces the temperature λ, see [`Update::Weighted`].
+    /// Replaces the temperature λ of MPPI, see [`Update::Weighted`].
     Temperature(f64),
-    /// Replaces [`Settings::iterations`], the iterations per tick.
+    /// Replaces [`Settings::iterations`], the number of iterations per tick.
     Iterations(usize),
-    /// Replaces [`Settings::start`], the initial mean.
+    /// Replaces [`Settings::start`], the mean of the first iteration's distribution.
     Start(Start),
-    /// Replaces [`Settings::spread`], the initial standard deviation.
+    /// Replaces [`Settings::spread`], the standard deviation of the first iteration's distribution.
     Spread(f64),
-    /// Replaces [`Settings::persistence`], the correlation between steps.
+    /// Replaces [`Settings::persistence`], the correlation of a candidate's noise between consecutive steps.
     Persistence(f64),
-    /// Replaces [`Settings::kept`], the elites carried over.
+    /// Replaces [`Settings::kept`], the number of elites that the next iteration evaluates again.
     Kept(usize),
-    /// Replaces [`Settings::proposals`], the candidates from the policy.
+    /// Replaces [`Settings::proposals`], the number of candidates that the policy proposes.
     Proposals(usize),
-    /// Replaces the standard deviation of [`Settings::noise`]. The noise is truncated at three standard deviations.
+    /// Replaces [`Settings::noise`], the noise on the policy's proposals. This is its standard deviation, and it is truncated at
+    /// three standard deviations.
     Noise(f64),
-    /// Replaces [`Settings::alpha`], the weight of the terminal value.
+    /// Replaces [`Settings::alpha`], the weight of the terminal value, an estimate of the return after the end of a candidate.
+    /// `None` omits this value.
     Alpha(Option<f64>),
     /// Replaces [`Settings::value`], the terminal value function.
     Value(Value),
     /// Replaces [`Settings::steps`], the horizon in steps.
     Steps(usize),
-    /// Replaces [`Settings::chunk`], the ticks per plan.
+    /// Replaces [`Settings::chunk`], the number of ticks for which a plan is flown.
     Chunk(usize),
-    /// Replaces [`Settings::delay`], planning one tick ahead.
+    /// Replaces [`Settings::delay`], whether a plan is made one tick in advance.
     Delay(bool),
-    /// Replaces [`Settings::margin`], the improvement a plan needs.
+    /// Replaces [`Settings::margin`], by how much the return of a plan must exceed that of the base controller, an LQI.
     Margin(f64),
-    /// Replaces [`Settings::ilqr`], iLQR's plan as a candidate.
+    /// Replaces [`Settings::ilqr`], whether the plan of an iLQR is a candidate.
     Ilqr(bool),
-    /// Replaces [`Settings::disturbance`], the observer's time constant.
+    /// Replaces [`Settings::disturbance`], the time constant of the disturbance estimate, s; `None` disables it.
     Disturbance(Option<f64>),
-    /// Replaces [`Settings::trust`], the limit on prediction errors.
+    /// Replaces [`Settings::trust`], the largest prediction error at which plans are made; `None` sets no limit.
     Trust(Option<f64>),
-    /// Replaces [`Settings::known`], the limit on extrapolation.
+    /// Replaces [`Settings::known`], the largest distance from the training data at which plans are made; `None` sets no limit.
     Known(Option<f64>),
     /// Replaces [`Settings::instructions`], the vector instruction set.
     Instructions(Instructions),
-    /// Replaces [`Settings::cores`], the number of threads.
+    /// Replaces [`Settings::cores`], the number of processor cores used.
     Cores(usize),
 }
 

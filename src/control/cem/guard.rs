@@ -1,5 +1,5 @@
-//! Conditions for planning with the model: its recent one-step predictions were accurate enough, and its residual does
-//! not extrapolate.
+//! Conditions under which the CEM planner (cross-entropy method) may use the model. Its recent one-step predictions must be
+//! accurate enough. Its residual, a learned correction of the physical model, must be near its training data.
 
 use super::rollout::{Actions, HORIZON, WIDTH};
 use super::{Cem, Settings, flown};
@@ -7,13 +7,13 @@ use crate::disturbance::{Disturbance, TIME_CONSTANT_S};
 use crate::{Observation, Target};
 use greylag_physics::Command;
 
-/// The observer of the model's prediction errors. `None` if no setting needs it.
+/// The observer that estimates the disturbance and the model's prediction error. `None` if no setting needs it.
 pub(super) fn predictions(settings: &Settings) -> Option<Disturbance> {
     settings.disturbance.or(settings.trust.map(|_| TIME_CONSTANT_S)).map(Disturbance::new)
 }
 
 impl Cem {
-    /// The observer of the disturbance. `None` if the settings do not include the disturbance in the plans.
+    /// The observer, if the plans are to include its disturbance estimate, else `None`.
     pub(super) fn disturbance(&self) -> Option<&Disturbance> {
         self.predictions.as_ref().filter(|_| self.settings.disturbance.is_some())
     }
@@ -34,10 +34,10 @@ impl Cem {
         predicted && known
     }
 
-    /// The policy's own command, without a search.
+    /// The command of the policy, without a search for a better one.
     pub(super) fn unsearched(&mut self, seen: &Observation, target: &Target) -> Command {
         (self.last, self.planned_for) = (None, None);
-        // lane 0 has no noise and holds the policy's own plan
+        // lane 0 of the SIMD block has no noise and holds the policy's own plan
         self.blocks[0] = [[[0.0; WIDTH]; 3]; HORIZON];
         self.fly(seen, target, Actions::Policy, [0, 1]);
         flown(&self.candidate(0).plan[0])

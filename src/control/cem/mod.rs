@@ -1,5 +1,5 @@
-//! CEM-MPC planner, section III-D of \[GSFM26\]. With a policy's proposals and critics' values it is the hybrid controller
-//! of section IV-C.
+//! CEM-MPC planner (section III-D of \[GSFM26\]): each tick (10 ms) it samples candidate plans, simulates them with the model and
+//! ranks them by their return. With a policy's proposals and critics' values it is the hybrid controller of section IV-C.
 
 mod candidates;
 mod changes;
@@ -26,18 +26,18 @@ use rollout::{Actions, Block, HORIZON, Machine, WIDTH, Worth};
 pub use settings::{Instructions, Settings, Start, Update, Value};
 use surrogate::Surrogate;
 
-/// Number of candidates whose terminal states the critics evaluate. A linear function fitted to these values then replaces the
-/// critics.
+/// Number of candidates whose terminal states the critics evaluate with [`Value::Fitted`]. A linear function fitted to these
+/// values then replaces the critics.
 const SURVEYED: usize = 128;
 
-/// Number of best candidates of the last iteration that the critics evaluate again.
+/// Number of the last iteration's best candidates that the critics then evaluate again.
 const RESCORED: usize = 64;
 
 /// Sideslip that lowers the reward by 1 per step, rad. The term applies only if the base controller uses a rudder. The paper's
 /// reward (eq. 30) has no sideslip term. Without this term a roll faster than the rudder can coordinate would cost nothing.
 const SIDESLIP: f64 = 0.3;
 
-/// The policy, base controller and iLQR planner that a search may use.
+/// Policy, base controller and iLQR planner, which a search may use.
 #[derive(Clone, Debug, Default)]
 pub struct Aids {
     /// The policy that proposes candidates, with its critics.
@@ -81,11 +81,11 @@ pub struct Cem {
     blocks: Vec<Block>,
     worth: Vec<Worth>,
     order: Vec<(f32, u32)>,
-    /// Plan of the last tick. `None` if the search's plan was not flown. `age` is the number of ticks for which it has flown.
+    /// Plan of the last tick. `None` if the search's plan was not flown. `age` is the number of ticks since the plan was made.
     last: Option<Plan>,
     age: usize,
-    /// With [`Settings::delay`]: the observation and target for which the next tick is planned. `planned_for` is the time
-    /// for which `last` was planned.
+    /// With [`Settings::delay`]: the predicted observation of the next tick and the target, from which its command is planned.
+    /// `planned_for` is the time for which `last` was planned.
     next: Option<(Observation, Target)>,
     planned_for: Option<Time>,
     kept: Vec<Plan>,
@@ -206,8 +206,8 @@ impl Cem {
         Some(mean)
     }
 
-    /// Searches around the base controller's plan. Returns the best plan only if its return exceeds the base's by more than the
-    /// margin plus the critics' disagreement. The disagreement is the larger one of the two plans.
+    /// Searches around the base controller's plan. Returns the best plan only if its return exceeds the base controller's by more
+    /// than a threshold: `Settings::margin` plus the larger of the critics' disagreements about the two plans.
     fn search_around_base(
         &mut self,
         seen: &Observation,
@@ -264,7 +264,7 @@ impl Cem {
         command
     }
 
-    /// The observation that the model predicts one tick after `seen`.
+    /// The observation that the model predicts one tick after `seen` if `command` is flown.
     fn after(&self, seen: &Observation, command: Command) -> Observation {
         let figures = &self.model.airframe.actuators;
         let mut actuators = Actuators::from_observed(&seen.actuators, &seen.previous, figures);
@@ -283,7 +283,7 @@ impl Cem {
         }
     }
 
-    /// The base controller's command, or that of the best plan if the plan's return is higher by the margin.
+    /// The base controller's command, or the command of the best plan if its return is sufficiently higher.
     fn over_base(&mut self, mut base: Base, seen: &Observation, target: &Target) -> Command {
         let begun = Instant::now();
         base.lqi.look_ahead(seen, target, &mut base.ahead);
@@ -309,7 +309,7 @@ impl Cem {
     }
 }
 
-/// A plan shifted by one tick, its last action repeated.
+/// Shifts a plan by one tick. Its last action is repeated.
 fn shifted(plan: &Plan) -> Plan {
     std::array::from_fn(|h| plan[(h + 1).min(HORIZON - 1)])
 }

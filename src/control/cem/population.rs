@@ -1,4 +1,7 @@
-//! The candidates of an iteration: sampling, rollouts and the update of the distribution.
+//! The candidates of one iteration of the cross-entropy method (CEM): sampling, simulation, and update of the distribution.
+//!
+//! A candidate is a plan: aileron, elevator and throttle at every step of the horizon. A block holds one candidate per SIMD
+//! lane.
 
 use std::cmp::Ordering;
 use std::time::Instant;
@@ -13,7 +16,8 @@ use crate::task::Task;
 use crate::{Observation, Target};
 
 impl Cem {
-    /// Samples the candidates of an iteration from the distribution into the blocks from `first` on.
+    /// Samples the candidates of the blocks from `first` on, with the mean `mean` and the standard deviation `spread`. The
+    /// noise of a candidate is correlated over the steps by `Settings::persistence`. Actions are clamped to ±1.
     pub(super) fn sample(&mut self, rng: &mut impl Rng, first: usize, mean: &Plan, spread: &Plan) {
         let begun = Instant::now();
         let old = self.settings.persistence;
@@ -35,8 +39,8 @@ impl Cem {
         self.spent.draw += begun.elapsed();
     }
 
-    /// Samples the noise that is added to the proposals in the blocks from `first` up to `end`. Lane 0 of the first block
-    /// has no noise.
+    /// Samples the noise that is added to the plans proposed by the policy or the base controller, in the blocks from `first`
+    /// up to `end`. The first candidate has no noise.
     pub(super) fn sample_noise(&mut self, rng: &mut impl Rng, [first, end]: [usize; 2]) {
         let begun = Instant::now();
         let [deviation, most] = self.settings.noise;
@@ -52,7 +56,7 @@ impl Cem {
         self.spent.draw += begun.elapsed();
     }
 
-    /// Rolls out the blocks from `first` up to `end`.
+    /// Simulates the candidates in the blocks from `first` up to `end` and stores their returns.
     pub(super) fn fly(
         &mut self,
         seen: &Observation,
@@ -76,7 +80,7 @@ impl Cem {
             sideslip: self.sideslip,
         };
         let (blocks, worth) = (&mut self.blocks[first..end], &mut self.worth[first..end]);
-        // blocks form the same pairs as on one core, which makes the results bit-identical
+        // the split keeps the pairs of blocks that one core would form, so that the results are bit-identical
         let half = blocks.len().div_ceil(4) * 2;
         match &mut self.second {
             Some(second) if half < blocks.len() => {
@@ -93,7 +97,7 @@ impl Cem {
         self.spent.fly += begun.elapsed();
     }
 
-    /// The plan, return and critics' disagreement of the candidate `index`.
+    /// The plan and the return of the candidate `index`, and the disagreement of the critics on its terminal value.
     pub(super) fn candidate(&self, index: usize) -> Valued {
         let (block, lane) = (index / WIDTH, index % WIDTH);
         let actions = &self.blocks[block];
@@ -102,8 +106,8 @@ impl Cem {
         Valued { plan, worth: returns[lane], doubt: doubt[lane] }
     }
 
-    /// Mean and standard deviation of the actions of the candidates in the blocks up to `end`, weighted by [`Update`], and
-    /// the best candidate. `None` if too few returns are finite.
+    /// Weighted mean and standard deviation of the actions of the candidates in the blocks up to `end`, and the best candidate.
+    /// [`Update`] sets the weights. `None` if too few returns are finite.
     pub(super) fn refit(&mut self, end: usize) -> Option<(Plan, Plan, Valued)> {
         let begun = Instant::now();
         let refitted = self.refitted(end);
@@ -158,7 +162,7 @@ impl Cem {
         Some((mean, spread, self.candidate(best.1 as usize)))
     }
 
-    /// Keeps the plans of the `count` best candidates for the next iteration.
+    /// Keeps the plans of the `count` best candidates as candidates of the next iteration.
     pub(super) fn keep(&mut self, count: usize) {
         let count = count.min(self.order.len());
         self.kept.clear();
@@ -172,7 +176,7 @@ impl Cem {
         }
     }
 
-    /// Writes a plan into one lane of a block.
+    /// Writes `plan` into one lane of a block.
     pub(super) fn put(&mut self, block: usize, lane: usize, plan: &Plan) {
         for (actions, given) in self.blocks[block].iter_mut().zip(plan) {
             actions.iter_mut().zip(given).for_each(|(lanes, x)| lanes[lane] = *x as f32);
@@ -180,7 +184,8 @@ impl Cem {
     }
 }
 
-/// Orders candidates by falling return. The lower index wins a tie, which makes the order the same on every machine.
+/// Orders candidates by falling return. Between equal returns the lower index comes first, so that the order is the same on
+/// every machine.
 fn better(a: &(f32, u32), b: &(f32, u32)) -> Ordering {
     b.0.total_cmp(&a.0).then(a.1.cmp(&b.1))
 }

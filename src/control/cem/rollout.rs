@@ -1,4 +1,5 @@
-//! Rollouts of many candidates at once, with the widest vector instructions of the processor.
+//! Rollouts: simulations of many candidate plans at once, with the widest vector instructions of the processor. A plan has
+//! actions for five steps. After them the base controller (the LQI) flies or, without one, the policy.
 
 use super::settings::Instructions;
 use super::surrogate::Surrogate;
@@ -15,7 +16,7 @@ use greylag_physics::actuators::Actuators;
 use greylag_physics::inputs::InputMemory;
 use greylag_physics::{ActuatorState, Airframe, Command, State};
 
-/// Number of candidates in a block, one per lane.
+/// Number of candidates in a block, one per lane of the vector.
 pub(super) const WIDTH: usize = ROW;
 
 /// Planning horizon H of \[GSFM26\], steps.
@@ -24,7 +25,7 @@ pub(super) const HORIZON: usize = 5;
 /// The actions (aileron, elevator, throttle of eq. 29) of `WIDTH` candidates over the horizon.
 pub(super) type Block = [[[f32; WIDTH]; 3]; HORIZON];
 
-/// Inputs of a rollout that all candidates of a tick share.
+/// Inputs of a rollout that all candidates of a control cycle share.
 #[derive(Clone, Copy)]
 pub(super) struct Scene<'a> {
     pub model: &'a GreyBox,
@@ -33,19 +34,19 @@ pub(super) struct Scene<'a> {
     pub target: &'a Target,
     /// The policy that proposes actions. Its critics evaluate the terminal state.
     pub agent: Option<&'a Agent>,
-    /// Weight α of the critics' terminal value, eq. (26). `None` omits the terminal value.
+    /// Weight α of the terminal value, eq. (26). `None` omits the terminal value.
     pub alpha: Option<f64>,
-    /// Terminal value function that replaces the critics.
+    /// Linear function that replaces the critics' terminal value.
     pub surrogate: Option<Surrogate>,
     /// Memory of the model's integrator: the last acceleration.
     pub memory: Memory,
     /// Constant disturbance added to the model's state rate, per second.
     pub disturbance: State,
-    /// Law of the base controller. It flies the steps after the plan and commands throttle and rudder during the plan too.
+    /// Control law of the base controller, which flies the steps after the plan and always commands throttle and rudder.
     pub ahead: Option<&'a Ahead>,
-    /// Number of steps of a rollout with a policy and no base controller. With neither, a rollout has five steps.
+    /// Number of steps of a rollout that has a policy and no base controller. A rollout with neither has five steps.
     pub steps: usize,
-    /// Sideslip that lowers the reward by 1 per step, rad. `None` omits the sideslip term.
+    /// Sideslip that lowers the reward of a step by 1, rad. `None` omits this term.
     pub sideslip: Option<f64>,
 }
 
@@ -54,22 +55,22 @@ pub(super) struct Scene<'a> {
 pub(super) enum Actions {
     /// The block holds the actions.
     Given,
-    /// The policy. The rollout replaces the block's offsets from the policy's actions by the resulting actions.
+    /// The policy's actions plus the offsets in the block. The rollout writes the resulting actions into the block.
     Policy,
-    /// The base controller. The rollout replaces the block's offsets from its actions by the resulting actions.
+    /// The base controller's actions plus the offsets in the block. The rollout writes the resulting actions into the block.
     Base,
 }
 
-/// Result of the rollout of a block's candidates: returns and terminal values.
+/// Result of the rollout of a block's candidates, with one value per lane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Worth {
-    /// Discounted returns, eq. (13), or eq. (26) with critics.
+    /// Discounted returns, eq. (13). With a terminal value they are those of eq. (26).
     pub returns: [f32; WIDTH],
-    /// Disagreement of the two critics on the terminal value, with the same discount and weight as that value.
+    /// Absolute difference of the critics' two terminal values, with the same discount and weight as the terminal value.
     pub doubt: [f32; WIDTH],
-    /// Observation at the terminal state, if the critics or the surrogate evaluate this state.
+    /// Observation at the terminal state, if there is a terminal value.
     pub end: [[f32; WIDTH]; OBSERVATIONS],
-    /// Value of the terminal state: the smaller of the two critics' values, or the surrogate's.
+    /// Undiscounted terminal value: the smaller of the two critics' values, or the value of the surrogate.
     pub value: [f32; WIDTH],
 }
 
@@ -82,9 +83,8 @@ impl Worth {
     };
 }
 
-/// The vector instruction set that rollouts are compiled for, with scratch memory for the networks.
-///
-/// Fused multiply-add is used where the processor has it. The last bits therefore differ between instruction sets.
+/// The vector instructions that rollouts use, with scratch memory for the networks. The last bits of the results differ
+/// between instruction sets, because fused multiply-add is used where the processor has it.
 #[derive(Clone, Debug)]
 pub(super) enum Machine {
     #[cfg(target_arch = "x86_64")]
@@ -99,7 +99,7 @@ pub(super) enum Machine {
 type Wide = Lanes<32, true, Pair<std::arch::x86_64::__m512>>;
 
 impl Machine {
-    /// The requested instruction set, or the widest narrower one that this processor supports.
+    /// Chooses the requested instruction set. If the processor lacks it, the widest narrower one that it supports is chosen.
     pub fn new(wanted: Instructions) -> Machine {
         match wanted {
             #[cfg(target_arch = "x86_64")]
@@ -118,7 +118,7 @@ impl Machine {
         }
     }
 
-    /// Rolls out every block and writes the returns.
+    /// Rolls out the candidates of every block and writes the results into `out`.
     pub fn fly(
         &mut self,
         scene: &Scene,
@@ -201,8 +201,8 @@ struct Flight<R> {
 }
 
 impl<R: Packed> Flight<R> {
-    /// Lags and delays of the deflections start in steady state at the present deflections. Over the five steps of a plan,
-    /// the effect of the present deflections is therefore overestimated.
+    /// Starts from the observed state. Lags and delays of the deflections' effects start in steady state at the present
+    /// deflections. Over the five steps of a plan, the effect of the present deflections is therefore overestimated.
     #[inline(always)]
     fn new(scene: &Scene) -> Self {
         let lane = R::from_f64;
@@ -233,7 +233,7 @@ impl<R: Packed> Flight<R> {
         }
     }
 
-    /// Advances by one step in the simulator's order and adds the discounted reward to the return.
+    /// Advances the state with the present actuator positions, then the actuators. Adds the discounted reward to the return.
     #[inline(always)]
     fn advance(&mut self, scene: &Scene, command: Command<R>) {
         let Scene { model, task, seen, .. } = scene;
@@ -259,7 +259,7 @@ impl<R: Packed> Flight<R> {
     }
 }
 
-/// One component of the actions of all blocks at a step. The last block is repeated to fill the vector.
+/// One component of the actions at `step` as a vector over all candidates. The last block is repeated to fill the vector.
 #[inline(always)]
 fn given<R: Packed>(blocks: &[Block], step: usize, component: usize) -> R {
     R::pack(
@@ -268,7 +268,7 @@ fn given<R: Packed>(blocks: &[Block], step: usize, component: usize) -> R {
     )
 }
 
-/// Computes the returns of up to `R::ROWS` blocks. The plan flies five steps, then the base controller or the policy flies.
+/// Computes the results of up to `R::ROWS` blocks.
 #[inline(always)]
 fn rollout<R: Packed>(
     scene: &Scene,
@@ -287,8 +287,8 @@ fn rollout<R: Packed>(
         None if scene.agent.is_some() => scene.steps,
         None => HORIZON,
     };
-    // the loops are plain, because an iterator that is not inlined is compiled without the vector instructions. There is only
-    // one call of the model, because a second inlined copy doubles a compile time of minutes
+    // no iterators, because one that is not inlined is compiled without the vector instructions. Only one call of the model,
+    // because a second inlined copy doubles a compile time of minutes
     let mut step = 0;
     while step < steps {
         let mut chosen = [R::zero(); ACTIONS];
@@ -316,7 +316,7 @@ fn rollout<R: Packed>(
                 command.aileron = (command.aileron + base.aileron).clamp(-1.0, 1.0);
                 command.elevator = (command.elevator + base.elevator).clamp(-1.0, 1.0);
             }
-            // a plan with a base controller has only aileron and elevator
+            // with a base controller, a plan determines only aileron and elevator
             command.throttle = base.throttle;
             command.rudder = base.rudder;
             command = slewed(command, &flight.previous[0], &scene.model.airframe);
@@ -363,8 +363,8 @@ fn rollout<R: Packed>(
     }
 }
 
-/// `command` with the change of its surfaces since the command `last` limited to the airframe's slew rate. The pilot applies the
-/// same limit. A plan without this limit oscillates if the channels are also delayed.
+/// Limits the changes of the surfaces from `last` to `command` to one step at the airframe's slew rate. In flight all commands
+/// are limited in the same way. Plans without this limit oscillate if the channels are also delayed.
 #[inline(always)]
 pub(super) fn slewed<R: Real>(
     command: Command<R>,

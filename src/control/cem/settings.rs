@@ -1,4 +1,6 @@
-//! Settings of the CEM planner.
+//! Settings of the CEM planner (cross-entropy method). Every control tick it samples candidate plans, simulates them with the
+//! model, and ranks them by their return, the sum of the rewards. Critics are networks that estimate the further return from
+//! the terminal state of a plan. The base controller is an LQI that flies where no plan is better. "The paper" is \[GSFM26\].
 
 use super::changes::Change;
 use super::rollout::HORIZON;
@@ -67,7 +69,7 @@ pub struct Settings {
     /// Number of candidates of the first iteration that the policy proposes, a multiple of 16. The first proposal has no
     /// noise.
     pub proposals: usize,
-    /// Standard deviation and truncation of the noise on the other proposals, in units of the action.
+    /// Standard deviation and largest magnitude of the noise on the other proposals, in units of the action.
     pub noise: [f64; 2],
     /// Weight α of the critics' terminal value, eq. (26). `None` omits the terminal value.
     pub alpha: Option<f64>,
@@ -79,9 +81,8 @@ pub struct Settings {
     /// Number of ticks, up to 5, for which a plan is flown before the next plan is made. With a base controller every tick
     /// is planned.
     pub chunk: usize,
-    /// Whether a tick plans for the next tick, from the state that the model predicts (RT-HCP's delay of one step).
-    /// Planning may then take the whole period, and a plan is flown for one tick. The setting has an effect only without a
-    /// base controller.
+    /// Whether a tick plans for the next tick, from the state that the model predicts. Planning may then take the whole
+    /// period, and a plan is flown for one tick. The setting has an effect only without a base controller.
     pub delay: bool,
     /// Amount by which a plan's return must exceed the base controller's return before the plan is flown.
     pub margin: f64,
@@ -90,10 +91,10 @@ pub struct Settings {
     /// Time constant of the disturbance estimate, s. `None` disables the estimate.
     pub disturbance: Option<f64>,
     /// Largest relative one-step prediction error (root mean square over the last half second) at which plans are made. A
-    /// larger error that looks like gusts is ignored. At any other larger error the base controller flies alone, or the policy
-    /// if there is no base controller. One of the two is required. `None` disables the check.
+    /// larger error is ignored if it is uncorrelated with the predictions, as gusts are. Otherwise the base controller flies
+    /// alone, or the policy if there is no base controller. One of the two is required. `None` disables the check.
     pub trust: Option<f64>,
-    /// Largest distance from the training data of the model's residual, see
+    /// Largest distance from the training data of the model's residual network, see
     /// [`Residual::distance`](greylag_model::Residual::distance), at which plans are made. 99.9 % of the training samples have
     /// a distance of at most 1. Beyond the limit the fallback is that of `trust`. `None` disables the check.
     pub known: Option<f64>,
@@ -104,7 +105,8 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// CEM-MPC alone with 1024 rollouts per tick. H = 5 as in the paper, which does not state N, K and I.
+    /// CEM-MPC without policy and critics, with 1024 rollouts per tick. The horizon H = 5 is the paper's. The paper does not
+    /// state N, I, and the number K of best candidates.
     pub const PAPER: Settings = Settings {
         population: 256,
         update: Update::Elites(16),
@@ -132,9 +134,9 @@ impl Settings {
     pub const POLICY: Settings = Settings { proposals: 32, ..Settings::PAPER };
     /// CEM with the critics' terminal value (CEM + Q).
     pub const CRITICS: Settings = Settings { alpha: Some(1.0), ..Settings::PAPER };
-    /// The hybrid controller. It searches close to the policy's plan, because the critics are accurate only to a few per
-    /// cent of a return and a wider search exploits their errors. With a spread of 1 about the centre of the range and a
-    /// proposal noise of 0.2, the hybrid controller performs worse than the policy.
+    /// The hybrid controller: CEM with the policy's proposals and the critics' terminal value. It searches close to the
+    /// policy's plan, because the critics are accurate only to a few per cent of a return and a wider search exploits their
+    /// errors. With a spread of 1 about the centre of the range and a proposal noise of 0.2, it performs worse than the policy.
     pub const HYBRID: Settings = Settings {
         alpha: Some(1.0),
         start: Start::Policy,
@@ -155,12 +157,12 @@ impl Settings {
     };
     /// MPPI with the rollouts of `Settings::PAPER`.
     pub const MPPI: Settings = Settings { update: Update::Weighted(0.01), ..Settings::PAPER };
-    /// The hybrid controller over an LQI. The LQI flies the steps after each plan, which replaces the critics' terminal value.
-    /// The steady-state attitude error is zero.
+    /// The search with an LQI as base controller. The LQI flies the steps after each plan. The rewards of these steps replace
+    /// the critics' terminal value.
     ///
     /// The margin corresponds to an attitude error of 0.12° at all steps. Smaller improvements are sampling noise. Flying such
-    /// plans would open the loop of the LQI's integrators. Hard targets settle to 0.04° with a margin of 0.002, and to 0.001°
-    /// with 0.05.
+    /// plans would keep the LQI's integrators from removing the steady-state error. On hard targets this error is 0.04° with
+    /// a margin of 0.002, and 0.001° with 0.05.
     pub const OVER_LQI: Settings = Settings {
         population: 128,
         update: Update::Elites(12),

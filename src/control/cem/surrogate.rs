@@ -1,7 +1,8 @@
-//! Terminal value at low computational cost: a linear function fitted to terminal states that the critics have evaluated.
+//! A cheap approximation of the critics, two neural networks that estimate the return from the terminal state of a plan. It is
+//! a linear function, fitted in each tick to terminal states that the critics have evaluated.
 //!
-//! The two critics are piecewise linear, and the candidates of one tick end close together. A linear function fitted in each
-//! tick therefore approximates them well. It needs no training and no file.
+//! The critics are piecewise linear, and the candidate plans of one tick end close together. A linear function therefore
+//! approximates them well. It needs no training and no file.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -9,11 +10,11 @@ use super::rollout::Worth;
 use crate::policy::OBSERVATIONS as N;
 use greylag_num::Real;
 
-/// Ridge regularisation as a fraction of each observation's variance. Without it, the slope would be undetermined in every
-/// direction in which the terminal states do not vary.
+/// Ridge regularisation, as a fraction of the variance of each component of the observation. Without it, the slope would be
+/// undetermined in every direction in which the terminal states do not vary.
 const RIDGE: f64 = 1e-4;
 
-/// The fitted linear function v(o) ≈ level + slope · (o − centre) of observations o as in eq. (28) of \[GSFM26\].
+/// The fitted function v(o) = level + slope · (o − centre). The observation o describes a state as in eq. (28) of \[GSFM26\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Surrogate {
     centre: [f64; N],
@@ -22,8 +23,8 @@ pub(super) struct Surrogate {
 }
 
 impl Surrogate {
-    /// The least-squares fit to the terminal values of the candidates in `worth`. `None` if there are fewer than two candidates
-    /// with finite values per slope, or if the fit is not finite.
+    /// The least-squares fit to the critics' values in `worth`, the rollout results of some candidates. Candidates with values
+    /// that are not finite are left out. `None` if fewer than 2 N candidates remain, or if the fit is not finite.
     pub fn fit(worth: &[Worth]) -> Option<Surrogate> {
         let ends = || worth.iter().flat_map(ends_of).filter(|(o, v)| (o.sum() + v).is_finite());
         let count = ends().count();
@@ -41,7 +42,7 @@ impl Surrogate {
             product.axpy(value - level, &off, 1.0);
         }
         for i in 0..N {
-            // an observation without variance has slope zero and must not divide by zero
+            // the smallest positive number keeps the matrix invertible if a component does not vary: its slope is then zero
             square[(i, i)] += RIDGE * square[(i, i)] + f64::MIN_POSITIVE;
         }
         let slope = square.cholesky()?.solve(&product);
@@ -49,7 +50,7 @@ impl Surrogate {
         surrogate.slope.iter().all(|x| x.is_finite()).then_some(surrogate)
     }
 
-    /// Evaluates the function at the observations of several candidates, one per lane.
+    /// Evaluates the function at the observation `seen`, or at several observations in the lanes of a SIMD type.
     #[inline(always)]
     pub fn value<R: Real>(&self, seen: &[R; N]) -> R {
         let mut value = R::from_f64(self.level);
@@ -62,7 +63,7 @@ impl Surrogate {
     }
 }
 
-/// Terminal observations of a block's candidates, each with the critics' value.
+/// The terminal observations of the candidates in one SIMD block, each with the critics' value.
 fn ends_of(worth: &Worth) -> impl Iterator<Item = (SVector<f64, N>, f64)> {
     (0..worth.value.len()).map(|lane| {
         let end = SVector::from_fn(|i, _| f64::from(worth.end[i][lane]));
@@ -74,7 +75,7 @@ fn ends_of(worth: &Worth) -> impl Iterator<Item = (SVector<f64, N>, f64)> {
 mod tests {
     use super::*;
 
-    /// Terminal states of which eleven observations vary. Their values are a linear function of these observations.
+    /// Terminal states of which eleven of the sixteen components vary. Their values are a linear function of these components.
     fn valued(block: usize) -> Worth {
         let mut worth = Worth::NONE;
         for lane in 0..worth.value.len() {
@@ -111,7 +112,7 @@ mod tests {
         assert_eq!(Surrogate::fit(&lost), None);
     }
 
-    /// Terminal states without variance give a function of slope zero.
+    /// Equal terminal states give a function with slope zero.
     #[test]
     fn equal_ends_have_their_value() {
         let mut worth = [Worth::NONE; 2];

@@ -6,16 +6,16 @@ use greylag_physics::airframe::{Envelope, Incidence};
 /// Allowed transient overshoot beyond the largest commanded bank, rad: 3 % of a step from −60° to 60°.
 const OVERSHOOT: f64 = 0.0628;
 
-/// Minimum and maximum of each limited quantity.
+/// Limits of the quantities that planner and limiter keep within the envelope.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// Load factor along the body's z axis, in g, positive upward.
+    /// Smallest and largest load factor along the body's z axis, in g, positive upward.
     pub load: [f64; 2],
-    /// Angle of attack, rad. Both limits lie before the stall.
+    /// Smallest and largest angle of attack, rad: ±95 % of the stall angle.
     pub alpha: [f64; 2],
     /// Largest |sideslip|, rad.
     pub sideslip: f64,
-    /// Largest |bank|, rad.
+    /// Largest |bank|, rad: the envelope's limit plus 0.0628 for overshoot.
     pub bank: f64,
 }
 

@@ -1,4 +1,5 @@
-//! A controller in series with the envelope limiter, combined in the same way as in the pilot.
+//! A controller followed by the envelope limiter, for simulated flights. In flight, the companion combines the two in the same
+//! way.
 
 use crate::envelope::EnvelopeLimiter;
 use crate::insight::Insight;
@@ -6,7 +7,7 @@ use crate::{Controller, Observation, Overruled, Target};
 use greylag_model::GreyBox;
 use greylag_physics::Command;
 
-/// A controller whose commands pass through the envelope limiter.
+/// A controller whose commands pass through the envelope limiter before they are returned.
 pub struct Guarded {
     controller: Box<dyn Controller>,
     limiter: EnvelopeLimiter,

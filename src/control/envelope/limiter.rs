@@ -1,18 +1,18 @@
-//! The envelope limiter between a controller and the surfaces. The elevator limits load factor and angle of attack, the
-//! aileron limits bank, the rudder limits sideslip.
+//! The envelope limiter between a controller and the surfaces. It limits load factor and angle of attack through the elevator,
+//! bank through the aileron, and sideslip through the rudder.
 //!
-//! Each limit gives a control law for the surface. The command is clamped between the deflections that the laws of the two
-//! sides give (min/max selection, as in fly-by-wire: Stevens, Lewis and Johnson, *Aircraft Control and Simulation*, 3rd ed.,
-//! section 4.6).
-//! The law is that of an exponential control barrier function (Nguyen and Sreenath, ACC 2016). If x is limited to x_lim
-//! and the surface controls ẍ,
+//! For each limit a control law gives the deflection of the surface that brings the limited quantity to the limit. The command
+//! is clamped between the deflections for the lower and the upper limit (min/max selection, as in fly-by-wire: Stevens, Lewis
+//! and Johnson, *Aircraft Control and Simulation*, 3rd ed., section 4.6).
+//! The law is that of an exponential control barrier function (Nguyen and Sreenath, ACC 2016). For a quantity x with the limit
+//! x_lim, whose second derivative ẍ depends on the surface, the law
 //!
 //! ```text
 //! ẍ + 2 ω (ẋ − ẋ_lim) + ω² (x − x_lim) = 0
 //! ```
 //!
-//! brings x to its limit without overshoot. Commands inside the limits are unchanged. The model gives the accelerations and
-//! the effects of the surfaces at the state that is predicted for the time at which a command acts. They therefore include the
+//! brings x to its limit without overshoot. A command between the two deflections is not changed. The model gives ẍ and its
+//! change with the deflection, at the state that is predicted for the time at which the command acts. Thus ẍ includes the
 //! effects of rolling, airspeed and gravity.
 
 use crate::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
@@ -24,7 +24,8 @@ use greylag_physics::airframe::Envelope;
 use greylag_physics::servos::Travel;
 use greylag_physics::{Command, Controls, State};
 
-/// Fraction of the limits of load factor, angle of attack and sideslip that the limiter uses. The rest covers model error.
+/// The control laws keep load factor, angle of attack and sideslip within this fraction of their limits. The rest covers model
+/// error.
 const PART: f64 = 0.96;
 /// Pole ω of the law for load factor and angle of attack, rad/s.
 const PITCH_POLE: f64 = 10.0;
@@ -32,27 +33,28 @@ const PITCH_POLE: f64 = 10.0;
 const BANK_POLE: f64 = 10.0;
 /// Pole ω of the law for sideslip, rad/s.
 const SIDESLIP_POLE: f64 = 10.0;
-/// Number of steps until a command acts. The first is the step to the next tick, the others stand for the lag of the actuator.
+/// Time until a command acts, in steps of [`STEP`]. The first step lasts until the next tick. The others approximate the lag of
+/// the actuator.
 const AHEAD: usize = 3;
-/// Deflection for the finite difference of a surface's effect, as a fraction of its travel.
+/// Change of a surface's deflection for finite differences, as a fraction of the surface's travel.
 const PROBE: f64 = 0.1;
 /// Time step for the finite difference of the model's rates, s.
 const SPAN_S: f64 = 1e-3;
 /// Change of the angle of attack for the finite difference of the load factor, rad.
 const SLOPE_STEP: f64 = 0.01;
-/// Number of Newton steps from the present angle of attack to the angle at the load-factor limit.
+/// Number of Newton steps from the predicted angle of attack to the angle of attack at the load-factor limit.
 const NEWTON: usize = 2;
 
 /// The limit that changed a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limit {
-    /// The largest or the smallest load factor.
+    /// Limits of the load factor, largest and smallest.
     Load,
-    /// The angle of attack before the stall, positive or negative.
+    /// Limits of the angle of attack before the stall, positive and negative.
     Incidence,
-    /// The largest bank to either side.
+    /// Limit of the bank to either side.
     Bank,
-    /// The largest sideslip to either side.
+    /// Limit of the sideslip to either side.
     Sideslip,
     /// No limit. The limiter is inactive because the model's predictions were wrong.
     Distrust,
@@ -68,7 +70,8 @@ pub struct Limited {
 }
 
 impl Limited {
-    /// The change of the command `wanted` by a limit, for the controller's integrators. `None` if no limit changed it.
+    /// The command `wanted` together with the limited command, for the controller's integrators. `None` if no limit changed
+    /// the command.
     pub fn overruled(&self, wanted: Command) -> Option<Overruled> {
         let wanted = wanted.clamped();
         let limited = self.by.is_some_and(|by| by != Limit::Distrust);
@@ -84,7 +87,7 @@ pub struct EnvelopeLimiter {
     disturbance: Disturbance,
 }
 
-/// The surface that acts on a limit.
+/// The surface that keeps a quantity within its limits.
 #[derive(Clone, Copy)]
 enum Surface {
     Elevator,
@@ -92,7 +95,7 @@ enum Surface {
     Rudder,
 }
 
-/// Value of a limit in its unit, and the rate of this value per second.
+/// A limit: the value of the limited quantity at the limit, rad, and the rate of this value, rad/s.
 #[derive(Clone, Copy, Debug)]
 struct At {
     limit: Limit,
@@ -100,10 +103,10 @@ struct At {
     rate: f64,
 }
 
-/// The model with the recent prediction error, at one altitude.
+/// The model with the estimated disturbance, at one altitude.
 struct Dynamics<'a> {
     model: &'a GreyBox,
-    /// Rates that the model did not predict, per second.
+    /// Estimated disturbance: the part of the recent state rates that the model did not predict, per second.
     unexplained: State,
     /// Altitude above mean sea level, m.
     altitude: f64,
@@ -114,17 +117,18 @@ struct Moment<'a> {
     dynamics: Dynamics<'a>,
     state: State,
     controls: Controls,
-    /// Rates of the state now and after [`SPAN_S`] of the predicted motion, per second.
+    /// Rates of `state`, and of the state [`SPAN_S`] later, per second.
     rates: [State; 2],
 }
 
-/// Value, first and second derivative of a limited quantity, and the effect of a surface on the second derivative.
+/// Value (rad), first and second derivative of a limited quantity, the deflection (rad) of the surface that acts on it, and
+/// the effect of the surface on the second derivative.
 #[derive(Clone, Copy)]
 struct Motion {
     value: f64,
     rate: f64,
     acceleration: f64,
-    /// Change of the second derivative per deflection, 1/rad.
+    /// Change of the second derivative per deflection, 1/s².
     effect: f64,
     deflection: f64,
 }
@@ -139,18 +143,18 @@ impl EnvelopeLimiter {
         }
     }
 
-    /// Uses `envelope` from now on.
+    /// Replaces the limits by those of `envelope`.
     pub fn keep_to(&mut self, envelope: &Envelope) {
         self.bounds = Bounds::new(envelope, &self.model.airframe.incidence);
     }
 
-    /// Clears the disturbance estimate. To be called when the controller engages.
+    /// Sets the disturbance estimate to zero. To be called when the controller engages.
     pub fn reset(&mut self) {
         self.disturbance = Disturbance::new(TIME_CONSTANT_S);
     }
 
     /// The command nearest to `wanted` that stays inside the envelope. To be called once per tick with the command that would
-    /// be flown. A command that is not finite is returned unchanged.
+    /// be flown without limits. `wanted` is returned unchanged if it is not finite, or if the model recently predicted wrongly.
     pub fn limit(&mut self, seen: &Observation, wanted: Command) -> Limited {
         self.disturbance.update(&self.model, seen);
         if !wanted.is_finite() {
@@ -198,8 +202,8 @@ impl EnvelopeLimiter {
         }
     }
 
-    /// Limits the sideslip of an aircraft with a rudder. Without a rudder no surface controls the sideslip: at full travel
-    /// the X8's aileron changes β̈ by less than a twentieth of the β̈ that the law needs.
+    /// Limits the sideslip of an aircraft with a rudder. Without a rudder no surface can limit it: full aileron of the Skywalker
+    /// X8 changes β̈ by less than a twentieth of what the law needs.
     fn keep_sideslip(&self, at: &Moment, out: &mut Limited) {
         let Some(rudder) = &self.model.airframe.actuators.rudder else {
             return;
@@ -214,7 +218,8 @@ impl EnvelopeLimiter {
         }
     }
 
-    /// Limits load factor and angle of attack. The limit of the load factor is converted to one of the angle of attack.
+    /// Limits load factor and angle of attack through the elevator. The limits of the load factor are converted to limits of the
+    /// angle of attack.
     fn keep_load(&self, at: &Moment, out: &mut Limited) {
         let travel = self.model.airframe.actuators.elevator.travel;
         let motion = at.motion(Surface::Elevator, travel, |s| s.alpha);
@@ -223,8 +228,7 @@ impl EnvelopeLimiter {
             return;
         }
         let bounds = self.bounds.within(PART);
-        // the load factor is computed for the elevator deflection that keeps the angle of attack constant, because a moving
-        // elevator adds its own lift
+        // The elevator adds its own lift. The load factor is therefore computed for the elevator deflection at which α̈ is zero.
         let held = (motion.deflection - motion.acceleration / motion.effect)
             .clamp(travel.least, travel.most);
         let law = |side: usize| motion.law(at.incidence_limit(&bounds, side, held), PITCH_POLE);
@@ -233,13 +237,14 @@ impl EnvelopeLimiter {
         let [push, pull] = at.lift_limits(&self.bounds, motion.deflection);
         let low = if pull > most.0 { (pull.min(least.0), Limit::Load) } else { most };
         let high = if push < least.0 { (push.max(most.0), Limit::Load) } else { least };
-        // The lower bound limits nose-up commands. It has priority: the stall and the largest load factor are avoided
-        // before the smallest load factor.
+        // the lower bound limits nose-up commands; it has priority because the stall and the largest load factor matter more
+        // than the smallest load factor
         clamp(&mut out.command.elevator, &mut out.by, travel, [low, high]);
     }
 }
 
-/// Clamps a command between the deflections (rad) of two limits. The lower limit has priority.
+/// Clamps `command` (−1..1) between the deflections `low` and `high` (rad). If this changes the command, `by` becomes the limit
+/// that belongs to the deflection. If `low` exceeds `high`, the result is `low`.
 fn clamp(
     command: &mut f64,
     by: &mut Option<Limit>,
@@ -267,12 +272,12 @@ impl Surface {
 }
 
 impl Dynamics<'_> {
-    /// Rates of `state` under `controls`, per second.
+    /// Rates of `state` under `controls` with the disturbance, per second.
     fn rate(&self, state: &State, controls: &Controls) -> State {
         self.model.rate(state, controls, self.altitude).advance(&self.unexplained, 1.0)
     }
 
-    /// Rates of `state` under `controls` now and after [`SPAN_S`] of the motion with these rates, per second.
+    /// Rates of `state`, and of the state [`SPAN_S`] later, under constant `controls`, per second.
     fn rates(&self, state: &State, controls: &Controls) -> [State; 2] {
         let rate = self.rate(state, controls);
         [rate, self.rate(&state.advance(&rate, SPAN_S), controls)]
@@ -280,10 +285,10 @@ impl Dynamics<'_> {
 }
 
 impl Moment<'_> {
-    /// Value and derivatives of the quantity `of`, and their response to `surface`, which has this `travel`.
+    /// Value and derivatives of the quantity `of`, and the effect of `surface`, whose travel limits are `travel`.
     fn motion(&self, surface: Surface, travel: Travel, of: impl Fn(&State) -> f64) -> Motion {
         let mut controls = self.controls;
-        // the acceleration is the change of the rate along the predicted motion
+        // second derivative: difference of the two rates over the time between them
         let along = |[rate, later]: &[State; 2]| (of(later) - of(rate)) / SPAN_S;
         let acceleration = along(&self.rates);
         let deflection = *surface.of(&mut controls);
@@ -295,20 +300,21 @@ impl Moment<'_> {
         Motion { value, rate, acceleration, effect, deflection }
     }
 
-    /// The load factor at an angle of attack and an elevator deflection (rad).
+    /// The load factor in g at the angle of attack `alpha` (rad) and the elevator deflection `elevator` (rad).
     fn load(&self, alpha: f64, elevator: f64) -> f64 {
         let state = State { alpha, ..self.state };
         let controls = Controls { elevator, ..self.controls };
         load_factor_under(&state, &self.dynamics.rate(&state, &controls))
     }
 
-    /// The elevator deflections (rad) at which the elevator's lift alone reaches the largest and the smallest load factor.
+    /// The elevator deflections (rad) at which the load factor reaches its largest and its smallest limit at the present angle of
+    /// attack, through the elevator's own lift. `elevator` is the predicted deflection (rad).
     fn lift_limits(&self, bounds: &Bounds, elevator: f64) -> [f64; 2] {
         let load = self.load(self.state.alpha, elevator);
         let travel = self.dynamics.model.airframe.actuators.elevator.travel;
         let probe = if elevator > 0.0 { PROBE * travel.least } else { PROBE * travel.most };
         let slope = (self.load(self.state.alpha, elevator + probe) - load) / probe;
-        // the lift of a canard has the other sign, as does its moment
+        // With a canard, positive elevator reduces the lift. There is then no such limit.
         if slope <= 0.0 {
             return [f64::INFINITY, f64::NEG_INFINITY];
         }
@@ -316,8 +322,9 @@ impl Moment<'_> {
         [most, least]
     }
 
-    /// The limit of the angle of attack on one side (0 minimum, 1 maximum): that of the load factor, or that of the stall if the
-    /// latter is nearer. `elevator` is the deflection (rad) at which the load factor is computed.
+    /// The smallest (`side` 0) or largest (`side` 1) permitted angle of attack. It is the angle at which the load factor reaches
+    /// its limit, or the limit before the stall if that comes first. `elevator` is the deflection (rad) at which the load factor
+    /// is computed.
     fn incidence_limit(&self, bounds: &Bounds, side: usize, elevator: f64) -> At {
         let stall = At { limit: Limit::Incidence, value: bounds.alpha[side], rate: 0.0 };
         let mut alpha = self.state.alpha;
@@ -325,7 +332,7 @@ impl Moment<'_> {
         for _ in 0..NEWTON {
             let load = self.load(alpha, elevator);
             slope = (self.load(alpha + SLOPE_STEP, elevator) - load) / SLOPE_STEP;
-            // beyond the stall, more angle of attack gives no more lift
+            // beyond the stall, the lift does not increase with the angle of attack
             if slope <= 0.0 || slope.is_nan() {
                 return stall;
             }
@@ -336,7 +343,7 @@ impl Moment<'_> {
         if !inside {
             return stall;
         }
-        // the angle of attack for a load factor is proportional to 1/V²
+        // the angle of attack at the limit changes with airspeed V, because the lift at one angle is proportional to V²
         let rate = self.rates[0].airspeed;
         let rate = -2.0 * rate / self.state.airspeed * bounds.load[side] / slope;
         At { limit: Limit::Load, value: alpha, rate }
@@ -344,7 +351,8 @@ impl Moment<'_> {
 }
 
 impl Motion {
-    /// The deflection at which the barrier condition holds with equality.
+    /// The deflection (rad) at which the equation of the law (see the top of this file) holds for the limit `at` with ω = `pole`
+    /// (rad/s).
     fn law(&self, at: At, pole: f64) -> (f64, Limit) {
         let wanted = -2.0 * pole * (self.rate - at.rate) - pole * pole * (self.value - at.value);
         (self.deflection + (wanted - self.acceleration) / self.effect, at.limit)

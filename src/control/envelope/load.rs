@@ -1,4 +1,4 @@
-//! The load factor of the model, from one step or from state rates, with its derivatives.
+//! The load factor that a model predicts, computed from one integration step or from the state rates, with its derivatives.
 
 use greylag_model::STEP;
 use greylag_physics::State;
@@ -6,7 +6,7 @@ use greylag_physics::State;
 /// Standard gravity g0, m/s²: the unit of load factors.
 pub const G0: f64 = 9.806_65;
 
-/// Velocity along the body's z axis, m/s.
+/// Velocity relative to the air along the body's z axis (positive downward), m/s.
 fn down(s: &State) -> f64 {
     s.airspeed * s.alpha.sin() * s.beta.cos()
 }

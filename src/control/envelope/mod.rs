@@ -1,4 +1,5 @@
-//! Envelope protection for every controller: load factor, angle of attack, bank and sideslip.
+//! Envelope protection, which limits the commands of any controller so that load factor, angle of attack, bank and sideslip stay
+//! within their limits.
 
 mod bounds;
 mod guarded;

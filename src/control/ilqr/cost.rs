@@ -1,8 +1,8 @@
-//! Scalar cost terms of iLQR with their derivatives.
+//! Scalar cost terms of the iLQR planner (iterative linear-quadratic regulator) with their derivatives.
 
 use std::ops::AddAssign;
 
-/// Value, slope and Gauss–Newton curvature of a cost term.
+/// Value of a cost term, its first derivative (slope), and a non-negative approximation of its second derivative (curvature).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cost {
     pub value: f64,
@@ -22,13 +22,14 @@ impl AddAssign for Cost {
     }
 }
 
-/// The cost ½ (x / size)².
+/// The cost ½ (x / size)² of a deviation `x`.
 pub(super) fn square(x: f64, size: f64) -> Cost {
     let w = 1.0 / size;
     Cost { value: 0.5 * (x * w) * (x * w), slope: w * w * x, curvature: w * w }
 }
 
-/// A cost that is quadratic near zero and linear beyond `far` (pseudo-Huber). With `None` it is quadratic everywhere.
+/// The pseudo-Huber cost of a deviation `x`. It is about ½ (x / size)² for |x| well below `far`, and about linear for |x|
+/// well above. If `far` is `None`, it is quadratic everywhere.
 pub(super) fn attitude(x: f64, size: f64, far: Option<f64>) -> Cost {
     let Some(far) = far else { return square(x, size) };
     let w = 1.0 / (size * size);
@@ -36,7 +37,7 @@ pub(super) fn attitude(x: f64, size: f64, far: Option<f64>) -> Cost {
     Cost { value: w * far * far * (root - 1.0), slope: w * x / root, curvature: w / root }
 }
 
-/// The cost ½ (e / size)² of the excess e of `x` beyond the bounds. Zero inside the bounds.
+/// The cost ½ (e / size)², where e is the distance of `x` from the interval `low`..`high`. Zero inside the interval.
 pub(super) fn beyond(x: f64, [low, high]: [f64; 2], size: f64) -> Cost {
     if x > high {
         square(x - high, size)

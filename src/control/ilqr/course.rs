@@ -2,8 +2,11 @@
 //!
 //! Each axis is driven by a cascade with limited rate and acceleration, like the attitude and rate loops of a flight
 //! controller. The load factor n limits the pitch rate. In coordinated flight θ̇ = (g / V) (n cos φ − cos θ), from the rigid
-//! body's force equations with V and α constant. A tick continues the path of the previous tick. The path waits while the
-//! aircraft lags behind it.
+//! body's force equations with V and α constant. Each tick (control cycle of 10 ms) continues the path of the previous tick.
+//! The path waits while the aircraft lags behind it.
+//!
+//! A steep bank uses up the load factor that a pitch-up needs. If the target combines both, the path may therefore first go
+//! to an intermediate bank, a fraction of the target bank.
 
 use super::STEPS;
 use crate::envelope::G0;
@@ -13,7 +16,7 @@ use std::f64::consts::TAU;
 
 /// Largest bank (rad) that is inserted into the formula for the path's body rates, which is singular at 90°.
 const STEEP: f64 = 1.4;
-/// Largest roll and pitch rates, rad/s: 70 and 60 °/s, the defaults of PX4's FW_R_RMAX and FW_P_RMAX_POS.
+/// Upper limits of the roll and pitch rates, rad/s: 70 and 60 °/s, the defaults of PX4's FW_R_RMAX and FW_P_RMAX_POS.
 const MOST: [f64; 2] = [1.22, 1.05];
 /// Largest lead of the path over the aircraft in each axis, rad.
 const AHEAD: f64 = 0.02;
@@ -24,7 +27,7 @@ const TICKS: [usize; 6] = [30, 60, 100, 150, 210, 300];
 /// Duration of the simulation by which intermediate banks are compared, ticks. `COARSE` is its integration step, ticks.
 const TRIAL: usize = 600;
 const COARSE: usize = 5;
-/// Another intermediate bank replaces the present one if its cost is below this fraction of the present one's cost.
+/// A new intermediate bank replaces the present one only if its cost is below this fraction of the present one's cost.
 const BETTER: f64 = 0.97;
 /// Smallest target bank for which an intermediate bank is considered, rad. `UP_ENOUGH` is the smallest pitch-up from the
 /// present pitch, rad.
@@ -36,7 +39,7 @@ const BRAKING: f64 = 0.7;
 /// Limits and gains with which a path approaches its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Approach {
-    /// Ratio of the rate to the error close to the target, 1/s.
+    /// Ratio of the commanded rate to the angle error close to the target, 1/s.
     gain: f64,
     /// Largest roll and pitch rates, rad/s.
     rates: [f64; 2],
@@ -51,8 +54,8 @@ pub(super) struct Approach {
 impl Approach {
     /// The approach of an aircraft that rolls at `full` rad/s with full aileron. Without a rudder, adverse yaw disturbs pitch,
     /// and the load-factor limit may leave no room for a correction. Such an aircraft therefore rolls slowly, and its roll
-    /// errors cost less. The values without a rudder were chosen on steps of the Skywalker X8, the values with a rudder on
-    /// steps of the Aerosonde. `results/flight-quality.txt` contains other steps.
+    /// errors cost less. The values without a rudder were chosen with attitude steps of the Skywalker X8, the values with a
+    /// rudder with attitude steps of the Aerosonde. `results/flight-quality.txt` has results of other steps.
     pub fn of(model: &GreyBox, full: f64) -> Approach {
         if model.has_rudder() {
             let rates = [full, MOST[1]];
@@ -84,7 +87,7 @@ impl Approach {
         let acceleration = self.accelerations[axis];
         let braking = (2.0 * BRAKING * acceleration * error.abs()).sqrt();
         let wanted = error.signum() * (self.gain * error.abs()).min(braking);
-        // the limits exclude zero at a bank that the load factor cannot hold
+        // at a bank that the load factor cannot hold, both limits of the pitch rate are negative
         let wanted = wanted.max(least).min(most);
         // a rate gain of four times the attitude gain is critically damped
         let change = (wanted - rate) * (4.0 * self.gain);
@@ -103,7 +106,7 @@ pub(super) struct Point {
 }
 
 impl Point {
-    /// The point of the measured attitude and its rates.
+    /// The point at the measured attitude, with the measured attitude rates.
     fn of(s: &State) -> Point {
         let (sin, cos) = s.roll.sin_cos();
         let turn = s.q * sin + s.r * cos;
@@ -111,7 +114,7 @@ impl Point {
         Point { attitude: [s.roll, s.pitch], rates }
     }
 
-    /// Rates p, q, r of the body in a coordinated turn along the path, rad/s. `turn` is g / V, 1/s.
+    /// Body rates p, q, r in a coordinated turn along the path, rad/s. `turn` is g / V, 1/s.
     fn body_rates(&self, turn: f64) -> [f64; 3] {
         let [roll, pitch] = self.attitude;
         let (sin, cos) = roll.clamp(-STEEP, STEEP).sin_cos();
@@ -121,7 +124,7 @@ impl Point {
     }
 }
 
-/// An intermediate bank, flown before a target bank that would use up the load factor needed for a pitch-up.
+/// An intermediate bank, which is flown before the target bank.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct First {
     /// The intermediate bank as a fraction of the target bank.
@@ -133,7 +136,7 @@ struct First {
 impl First {
     const NONE: First = First { part: 1.0, ticks: 0 };
 
-    /// The intermediate bank one tick later.
+    /// The same intermediate bank, flown for one tick less.
     fn later(self) -> First {
         First { ticks: self.ticks.saturating_sub(1), ..self }
     }
@@ -150,12 +153,13 @@ struct Task<'a> {
     turn: f64,
     /// Target roll and pitch, rad.
     target: [f64; 2],
+    /// Smallest and largest load factor.
     load: [f64; 2],
     approach: &'a Approach,
 }
 
 impl Task<'_> {
-    /// The point `span` seconds later on the way to `bank` (rad) and the target pitch.
+    /// The point of the path `span` seconds after `from`, on the way to `bank` (rad) and the target pitch.
     fn step(&self, from: &Point, bank: f64, span: f64) -> Point {
         let Point { attitude: [roll, pitch], rates: [rolling, pitching] } = *from;
         let approach = self.approach;
@@ -184,8 +188,8 @@ impl Task<'_> {
         sum
     }
 
-    /// The intermediate bank with the smallest cost. It replaces the present one, `flown`, only if its cost is smaller by the
-    /// factor `BETTER`.
+    /// Returns the intermediate bank with the smallest cost. It replaces the present one, `flown`, only if its cost is below the
+    /// fraction `BETTER` of the latter's cost.
     fn choose(&self, from: &Point, flown: First) -> First {
         let [bank, pitch] = self.target;
         if bank.abs() < STEEP_ENOUGH || pitch - from.attitude[1] < UP_ENOUGH {
@@ -236,7 +240,7 @@ impl Course {
         &self.points[step]
     }
 
-    /// Rates p, q, r of the body on the path after `step` steps, rad/s.
+    /// Body rates p, q, r on the path after `step` steps, rad/s.
     pub fn turning(&self, step: usize) -> [f64; 3] {
         self.turning[step]
     }
@@ -276,7 +280,7 @@ impl Course {
     }
 }
 
-/// The angle `x` wrapped to −π..π, rad.
+/// Wraps the angle `x` (rad) to −π..π.
 pub(super) fn wrapped(x: f64) -> f64 {
     (x + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0
 }
@@ -341,7 +345,7 @@ mod tests {
         let first = steep.choose(&dive, First::NONE);
         assert!(first.ticks > 0 && first.part < 1.0, "{first:?}");
         assert!(steep.cost(&dive, first) < BETTER * steep.cost(&dive, First::NONE));
-        // the present bank is kept, and a bank that uses little load factor is not delayed
+        // the present intermediate bank is kept, and a target bank that uses little load factor is not delayed
         assert_eq!(steep.choose(&dive, first), first);
         assert_eq!(task([0.3, 0.49]).choose(&dive, First::NONE), First::NONE);
     }

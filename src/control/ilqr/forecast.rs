@@ -1,4 +1,4 @@
-//! Comparison of the attitude that a plan predicted with the attitude that is reached.
+//! Comparison of the attitude that a plan predicted with the attitude that is reached. A tick is a control cycle of 10 ms.
 //!
 //! One-step predictions do not show an error of the closed loop: a model whose accelerations are nearly right may still give
 //! plans under which the aircraft oscillates. A comparison after a quarter of a second shows the oscillation.
@@ -11,14 +11,14 @@ use super::course::wrapped;
 /// Ticks between a prediction and its comparison.
 pub(super) const SPAN: usize = 25;
 
-/// Attitude that a plan predicted, and the target that it was made for: roll and pitch, rad.
+/// Attitude that a plan predicted, and the target of this plan: roll and pitch, rad.
 #[derive(Clone, Copy, Debug)]
 struct Prediction {
     attitude: [f64; 2],
     target: [f64; 2],
 }
 
-/// Predictions of the last ticks.
+/// Predictions made in the last [`SPAN`] ticks.
 #[derive(Clone, Debug)]
 pub(super) struct Forecast {
     /// The prediction for each tick, at the tick's number modulo [`SPAN`].
@@ -31,13 +31,14 @@ impl Forecast {
         Forecast { expected: [None; SPAN], now: 0 }
     }
 
-    /// Drops all predictions, because their plans are not flown.
+    /// Drops all predictions. They are void if their plans are not flown.
     pub fn forget(&mut self) {
         self.expected = [None; SPAN];
     }
 
-    /// Advances to the next tick. Returns the larger of the prediction's errors in roll and pitch, rad. Each error is reduced by
-    /// the change of the target since the prediction. `None` if there is no prediction for this tick.
+    /// Advances to the next tick. Compares the attitude in `seen` with the prediction for this tick and returns the larger of
+    /// the errors in roll and pitch, rad. Each error is reduced by the change of the target since the prediction. `None` if
+    /// there is no prediction for this tick.
     pub fn error(&mut self, seen: &State, target: &Target) -> Option<f64> {
         self.now = (self.now + 1) % SPAN;
         let then = self.expected[self.now].take()?;
@@ -49,7 +50,7 @@ impl Forecast {
         Some(of(0).max(of(1)))
     }
 
-    /// Stores the state that the plan of this tick predicts after [`SPAN`] ticks.
+    /// Stores the attitude that the plan of this tick predicts after [`SPAN`] ticks.
     pub fn note(&mut self, after: &State, target: &Target) {
         self.expected[self.now] = Some(Prediction {
             attitude: [after.roll, after.pitch],

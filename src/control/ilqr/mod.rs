@@ -1,9 +1,9 @@
-//! iLQR: a plan over half a second from exact derivatives of the model.
+//! iLQR: a planner that optimises aileron and elevator over the next half second with exact derivatives of the model.
 //!
-//! The method is differential dynamic programming without second derivatives of the model (Todorov and Li, ACC 2005;
-//! Tassa, Mansard and Todorov, ICRA 2014, for limited commands). Each tick runs one iteration from the last plan, as in
-//! the real-time iteration of Diehl et al. (2002). Throttle and attitude limits come from the LQI. The prediction
-//! includes the disturbance estimate. The steady-state error is therefore zero.
+//! The method is differential dynamic programming without second derivatives of the model (Todorov and Li, ACC 2005; Tassa,
+//! Mansard and Todorov, ICRA 2014, for limited commands). Each tick (control cycle of 10 ms) improves the plan of the last
+//! tick by one iteration, as in the real-time iteration of Diehl et al. (2002). The LQI provides throttle and rudder and
+//! limits the target attitude. The prediction includes the disturbance estimate. The steady-state error is therefore zero.
 
 mod cost;
 mod course;
@@ -34,13 +34,13 @@ use solve::Solver;
 /// Horizon in steps of 10 ms.
 const STEPS: usize = 50;
 
-/// Ticks for which the LQI flies after a wrong prediction. This time exceeds the averaging time of the prediction check. A
-/// model that is wrong intermittently is therefore not used in between.
+/// Number of ticks for which the LQI flies after a wrong prediction. This time is longer than the averaging time of the
+/// prediction check. Otherwise, a model that is wrong intermittently would be used between its wrong predictions.
 const WAIT: usize = 500;
 
-/// Ticks between simulations of the LQI's flight as a possible starting point. Without these simulations, more of the steps
-/// with 40 ms of delay overshoot (18 instead of 10 %). A simulation at every tick would take one sixth of the controller's
-/// computing time.
+/// Number of ticks between two simulations of the LQI's commands, which are a possible starting point of the plan. Without
+/// these simulations, 18 instead of 10 % of the attitude steps with 40 ms of delay overshoot. A simulation at every tick
+/// would take one sixth of the controller's computing time.
 const EVERY: usize = 5;
 
 /// Aileron and elevator commands as fractions of the largest deflection.
@@ -61,19 +61,19 @@ pub struct Ilqr {
     approach: Option<Approach>,
     course: Course,
     forecast: Forecast,
-    /// Ticks for which the LQI still flies.
+    /// Number of further ticks for which the LQI flies.
     waiting: usize,
     desk: Desk,
 }
 
 impl Ilqr {
-    /// A planner with `model`. `lqi` is a starting point of the plans and flies if there is no plan.
+    /// A planner with `model`. The commands of `lqi` are a starting point of the plans. If there is no plan, `lqi` flies.
     pub fn new(model: &GreyBox, lqi: Lqi) -> Ilqr {
         Ilqr::with("ilqr", model, lqi, None, Settings::PLAIN)
     }
 
-    /// A planner with `settings`, registered under `name`. With `Start::Policy`, the policy of `agent` is a further starting
-    /// point.
+    /// A planner with `settings` and the controller name `name`. With `Start::Policy`, the commands of `agent`'s policy are
+    /// a further starting point.
     pub fn with(
         name: &'static str,
         model: &GreyBox,
@@ -106,8 +106,8 @@ impl Ilqr {
         }
     }
 
-    /// Aileron and elevator commands of the first `N` steps (at most 50) of this tick's plan. `None` if no plan is finite,
-    /// and while the LQI flies after a wrong prediction.
+    /// Runs a tick and returns the aileron and elevator commands of the first `N` steps (at most 50) of its plan. `None` if
+    /// every plan has an infinite or undefined cost, and while the LQI flies after a wrong prediction.
     pub(crate) fn plan<const N: usize>(
         &mut self,
         seen: &Observation,
@@ -118,8 +118,8 @@ impl Ilqr {
     }
 }
 
-/// Limits and gains of the path on which `model` approaches a target. `None` if the plan follows the target itself, or if
-/// the model has no positive roll rate at cruise.
+/// Limits and gains of the path on which the aircraft approaches a target. `None` if the plan follows the target itself.
+/// Also `None` if the model cannot be trimmed at cruise or positive aileron does not roll it to the right.
 fn approach(model: &GreyBox, towards: Towards) -> Option<Approach> {
     match towards {
         Towards::Target => None,
@@ -127,7 +127,7 @@ fn approach(model: &GreyBox, towards: Towards) -> Option<Approach> {
     }
 }
 
-/// State kept between ticks for the warm start: solver, last plan and its trajectory.
+/// Data that are kept between ticks for the warm start: solver, last plan and its trajectory.
 #[derive(Clone, Debug)]
 struct Desk {
     solver: Solver,
@@ -135,16 +135,16 @@ struct Desk {
     plan: Option<[Surfaces; STEPS]>,
     /// The last tick's target.
     target: Option<Target>,
-    /// Ticks until the LQI's flight is simulated again as a starting point.
+    /// Number of ticks until the LQI's commands are simulated again as a starting point.
     until_lqi: usize,
     flown: Trajectory,
 }
 
-/// Starting points of a tick other than the last plan.
+/// Sources of this tick's starting points in addition to the last plan.
 struct Starts<'a> {
-    /// The LQI in its state before this tick's command.
+    /// The LQI with its state before this tick's command.
     lqi: &'a Lqi,
-    /// Memory for the LQI's gains over the plan.
+    /// Memory for the LQI's control laws over the steps of the plan.
     ahead: &'a mut Ahead,
     actor: Option<&'a Actor>,
     units: &'a mut Units<f32>,
@@ -152,9 +152,9 @@ struct Starts<'a> {
 }
 
 impl Desk {
-    /// The starting plan of lowest cost, with its cost. The candidates are the last plan shifted by a step, the LQI's
-    /// commands in the model (every [`EVERY`] ticks and for a new target) and the policy's commands in the model (for a
-    /// new target). `None` if no cost is finite.
+    /// Returns the starting plan of lowest cost, with this cost. Its trajectory is stored in `flown`. The candidates are the
+    /// last plan shifted by a step, the LQI's commands in a simulation (every [`EVERY`] ticks and for a new target) and the
+    /// policy's commands in a simulation (for a new target). `None` if no candidate has a finite cost.
     fn begin(&mut self, problem: &Problem, starts: Starts) -> Option<([Surfaces; STEPS], f64)> {
         let mut best = None;
         if let Some(last) = &self.plan {
@@ -188,7 +188,7 @@ impl Desk {
         best
     }
 
-    /// Runs this tick's iterations and returns the plan. `None` if no plan is finite.
+    /// Runs this tick's iterations and returns the plan. `None` if no starting plan has a finite cost.
     fn improve(&mut self, problem: &Problem, starts: Starts) -> Option<[Surfaces; STEPS]> {
         let (mut start, mut cost) = self.begin(problem, starts)?;
         for _ in 0..problem.settings.iterations {
@@ -217,7 +217,7 @@ impl Controller for Ilqr {
     }
 
     fn overruled(&mut self, by: &Overruled) {
-        // a plan has no integrators. The LQI has integrators and is informed only while it flies
+        // a plan has no integrators. The LQI has integrators, and they are corrected only while its commands are flown
         if self.desk.plan.is_none() {
             self.lqi.overruled(by);
         }

@@ -1,4 +1,6 @@
-//! The optimal control problem of a tick: rollout, cost and their derivatives.
+//! The optimal control problem that iLQR (iterative linear quadratic regulator) solves at each tick of 10 ms. This file
+//! computes the simulated trajectory of a plan, its cost, and the derivatives of both. A plan is a sequence of aileron and
+//! elevator commands over the horizon.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -17,11 +19,12 @@ use greylag_physics::actuators::Actuators;
 use greylag_physics::inputs::InputMemory;
 use greylag_physics::{Command, Controls, State};
 
-/// Number of states: the eight of eq. (4), then four for aileron and four for elevator. The four states of a surface are its
-/// deflection now and one step ago, and its last two commanded deflections, rad.
+/// Number of states: the aircraft's eight ([`State`]), then four for aileron and four for elevator. The four states of a surface
+/// are its deflection now and one step ago, and its last two commanded deflections, rad.
 pub(super) const STATES: usize = 16;
 
-/// Indices of the deflections of aileron and elevator in the state. The other three states of each filter follow.
+/// Indices of the deflections of aileron and elevator in the state vector. After each follow the other three states of the
+/// surface.
 pub(super) const SURFACES: [usize; 2] = [8, 12];
 
 /// A matrix over the states.
@@ -29,33 +32,34 @@ pub(super) type Square = SMatrix<f64, STATES, STATES>;
 /// A vector over the states.
 pub(super) type Vector = SVector<f64, STATES>;
 
-/// Limit of the angle of attack beyond which the excess adds to the cost, and the scale of this excess, rad. Both are used only
-/// if the settings have no envelope limits.
+/// An angle of attack beyond the first value adds to the cost; the second value is the scale of the excess, rad. Both are used
+/// only if the settings or the problem have no envelope limits.
 const STALL: [f64; 2] = [0.16, 0.02];
 
 /// The optimal control problem of one tick.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Problem<'a> {
     pub model: &'a GreyBox,
+    /// The observation of this tick, from which the plan starts.
     pub seen: &'a Observation,
     pub goal: Goal,
-    /// Attitude reference over the plan.
+    /// Attitude reference at each step of the plan.
     pub course: &'a Course,
-    /// Dynamics of the path to the target. `None` if the plan follows the target itself.
+    /// Limits and gains of the reference path to the target. `None` if the reference is the target itself.
     pub approach: Option<&'a Approach>,
     /// Constant throttle over the plan, 0..1.
     pub throttle: f64,
-    /// Constant rudder command over the plan, from the LQI.
+    /// Constant rudder command over the plan, from the LQI (linear quadratic controller with integral action).
     pub rudder: f64,
     pub memory: Memory,
     /// Constant disturbance added to the model's state rate, per second.
     pub disturbance: State,
     pub settings: &'a Settings,
-    /// Limits beyond which load factor, angle of attack and sideslip add to the cost. `None` for a cost without them.
+    /// Limits of load factor, angle of attack and sideslip; an excess adds to the cost. `None` for a cost without these limits.
     pub bounds: Option<Bounds>,
 }
 
-/// States and deflections along a plan.
+/// States and deflections at each step of a plan. `filters` has the four states of aileron and of elevator.
 #[derive(Clone, Debug)]
 pub(super) struct Trajectory {
     states: Vec<State>,
@@ -76,12 +80,12 @@ impl Trajectory {
         self.states.iter()
     }
 
-    /// The state vector at a step minus that of `other`.
+    /// The state vector of this trajectory at `step` minus that of `other`.
     pub fn less(&self, other: &Trajectory, step: usize) -> Vector {
         self.at(step) - other.at(step)
     }
 
-    /// The state vector at a step.
+    /// The state vector at `step`.
     pub fn at(&self, step: usize) -> Vector {
         let s = self.states[step].to_array();
         let mut x = Vector::zeros();
@@ -93,7 +97,7 @@ impl Trajectory {
     }
 }
 
-/// The simulated aircraft of a rollout.
+/// The simulated aircraft.
 struct Flight {
     state: State,
     actuators: Actuators,
@@ -150,8 +154,8 @@ impl Problem<'_> {
         self.fly_with(out, |step, _| plan[step]).1
     }
 
-    /// Simulates the commands that `choose` returns for a step and the trajectory up to this step. Writes the trajectory to `out`
-    /// and returns the plan with its cost.
+    /// Simulates the aircraft with the commands that `choose` returns. The arguments of `choose` are the step and the trajectory
+    /// up to this step. Writes the trajectory to `out`, and returns the commands as a plan with its cost.
     pub fn fly_with(
         &self,
         out: &mut Trajectory,
@@ -160,7 +164,8 @@ impl Problem<'_> {
         self.fly_choosing(out, |step, _, trajectory| choose(step, trajectory))
     }
 
-    /// Simulates the LQI's commands. Writes the trajectory to `out` and returns the commands as a plan with its cost.
+    /// Simulates the aircraft under the LQI. Writes the trajectory to `out`, and returns the LQI's commands as a plan with its
+    /// cost.
     pub fn follow(&self, ahead: &Ahead, out: &mut Trajectory) -> ([Surfaces; STEPS], f64) {
         let figures = &self.model.airframe.actuators;
         let mut reference = ahead.reference();
@@ -171,7 +176,8 @@ impl Problem<'_> {
         })
     }
 
-    /// Simulates the policy's commands. Writes the trajectory to `out` and returns the commands as a plan with its cost.
+    /// Simulates the aircraft under the policy (a trained network) `actor`. Writes the trajectory to `out`, and returns the
+    /// policy's commands as a plan with its cost.
     pub fn follow_policy(
         &self,
         actor: &Actor,
@@ -213,7 +219,7 @@ impl Problem<'_> {
         (plan, cost)
     }
 
-    /// Cost terms of the state `s` after `step` steps, each with the index of its component in the state.
+    /// Cost terms of the state `s` after `step` steps. Each term depends on one component of the state; its index is given.
     fn costs(&self, s: &State, step: usize) -> [(usize, Cost); 7] {
         let [mut p, mut q, mut r, _, beta] = self.goal.steady;
         let point = self.course.at(step);
@@ -245,7 +251,7 @@ impl Problem<'_> {
         self.costs(state, step).iter().map(|(_, cost)| cost.value).sum()
     }
 
-    /// Cost of the load factor in the step from one state to the next.
+    /// Cost of the load factor's excess over its limits in the step from one state to the next.
     fn load(&self, from: &State, to: &State) -> Cost {
         match (&self.bounds, &self.settings.envelope) {
             (Some(bounds), Some(barrier)) => {
@@ -255,8 +261,8 @@ impl Problem<'_> {
         }
     }
 
-    /// Cost of the load factor in a step, and the gradient of the load factor with respect to the state before the step.
-    /// `transition` is the step's linear transition. `None` if the cost is zero.
+    /// Cost of the load factor in `step`, and the gradient of the load factor with respect to the state before the step.
+    /// `transition` is the linearised step. `None` if the cost is zero.
     pub fn load_terms(
         &self,
         trajectory: &Trajectory,
@@ -277,7 +283,7 @@ impl Problem<'_> {
         Some((cost, slope))
     }
 
-    /// Gradient of the state cost after `step` steps, and the diagonal of its curvature.
+    /// Gradient of the cost of the state after `step` steps, and the diagonal of its Gauss–Newton Hessian.
     pub fn stage_terms(&self, trajectory: &Trajectory, step: usize) -> (Vector, Vector) {
         let (mut slope, mut curvature) = (Vector::zeros(), Vector::zeros());
         let weight = if step == STEPS { self.settings.last } else { 1.0 };
@@ -288,20 +294,20 @@ impl Problem<'_> {
         (slope, curvature)
     }
 
-    /// For each surface: the index in the state `x` of the last commanded deflection, and the deflection (rad) of full command on
-    /// the same side.
+    /// For each surface: the index of its last commanded deflection in the state vector `x`, and its deflection (rad) at full
+    /// command to the side of that commanded deflection.
     pub fn last_commands(&self, x: &Vector) -> [(usize, f64); 2] {
         let figures = &self.model.airframe.actuators;
         let travels = [figures.aileron.travel, figures.elevator.travel];
         std::array::from_fn(|i| (SURFACES[i] + 2, travels[i].slope(x[SURFACES[i] + 2])))
     }
 
-    /// Weight of the squared change of a command from one step to the next.
+    /// Second derivative of the cost with respect to the change of a command from one step to the next.
     pub fn move_weight(&self) -> f64 {
         1.0 / (self.settings.moves * self.settings.moves)
     }
 
-    /// The transition of the aircraft and its actuators in one step, linearised about the trajectory.
+    /// The transition of the aircraft and its actuators from `step` to the next step, linearised about the trajectory.
     pub fn linear(&self, trajectory: &Trajectory, step: usize) -> Transition {
         let figures = &self.model.airframe.actuators;
         let (state, controls) = (&trajectory.states[step], &trajectory.controls[step]);

@@ -1,4 +1,4 @@
-//! Settings of iLQR: cost scales, the reference, iterations and starting points.
+//! Settings of iLQR (iterative linear-quadratic regulator): cost scales, the reference, iterations and starting points.
 
 /// Settings of iLQR. The cost scales follow Bryson's rule: an error of the size of its scale has the same cost in every term.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,8 +19,8 @@ pub struct Settings {
     pub envelope: Option<Barrier>,
     /// Reference that the plan follows.
     pub towards: Towards,
-    /// Largest error of the attitude predicted a quarter of a second before, rad. After a larger error the LQI flies for 5 s.
-    /// `None` disables the comparison.
+    /// Largest accepted difference between the attitude and its prediction a quarter of a second before, rad. After a larger
+    /// difference the LQI flies for 5 s. `None` disables the comparison.
     pub missed: Option<f64>,
     /// Number of iterations per tick.
     pub iterations: usize,
@@ -60,8 +60,8 @@ pub enum Towards {
 }
 
 impl Settings {
-    /// Settings of the controller `ilqr`. Several variants were flown on every seventh target. With these settings the attitude
-    /// settles as fast as with any other variant and is the steadiest in moderate turbulence.
+    /// Settings of the controller `ilqr`. Several variants flew every seventh target of the target file. With these settings the
+    /// attitude settles as fast as with any other variant and is the steadiest in moderate turbulence.
     pub const PLAIN: Settings = Settings {
         attitude: 0.05,
         far: None,
@@ -81,8 +81,8 @@ impl Settings {
         far: Some(0.15),
         envelope: Some(Barrier { part: 0.94, load: 0.05, alpha: 0.01, sideslip: 0.05 }),
         towards: Towards::Path,
-        // with 0.12 to 0.3 rad no aircraft is lost in steps with models drawn from the coefficients' standard deviations
-        // (results/flight-quality.txt)
+        // with limits from 0.12 to 0.3 rad no step response of an aircraft whose coefficients were drawn from their
+        // standard deviations diverged (results/flight-quality.txt)
         missed: Some(0.15),
         start: Start::Policy,
         ..Settings::PLAIN

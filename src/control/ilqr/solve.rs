@@ -1,17 +1,18 @@
-//! One iLQR iteration: backward pass for gains, forward pass with a line search.
+//! One iteration of the iterative linear-quadratic regulator (iLQR). A backward pass computes feedback gains and changes of the
+//! commands. A forward pass with a line search applies them.
 
 use nalgebra::{Matrix2, SMatrix, Vector2};
 
 use super::problem::{Problem, STATES, Square, Trajectory, Vector};
 use super::{STEPS, Surfaces};
 
-/// Feedback gain from the state deviation to the commands.
+/// Feedback gain on the deviation of the state from the trajectory of the present plan.
 type Gain = SMatrix<f64, 2, STATES>;
 
-/// Step lengths of the line search, largest first.
+/// Step lengths of the line search: factors on the changes of the commands, largest first.
 const PARTS: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
 
-/// Feedback gains and feed-forward changes, with scratch memory.
+/// Feedback gains and changes of the commands at each step of a plan, with scratch memory.
 #[derive(Clone, Debug)]
 pub(super) struct Solver {
     gains: Vec<Gain>,
@@ -28,7 +29,7 @@ impl Solver {
         }
     }
 
-    /// Scratch memory for a second trajectory.
+    /// The scratch trajectory, for use by the caller.
     pub fn spare(&mut self) -> &mut Trajectory {
         &mut self.spare
     }
@@ -38,9 +39,9 @@ impl Solver {
         std::mem::swap(&mut self.spare, trajectory);
     }
 
-    /// One iteration from `plan`, which has the trajectory `trajectory` and the cost `cost`. Returns the first plan of the line
-    /// search with a lower cost, and this cost. If there is none, it returns `plan` and `cost`. `trajectory` becomes that of the
-    /// returned plan.
+    /// Makes one iteration from `plan`, which has the trajectory `trajectory` and the cost `cost`. Returns the first plan of the
+    /// line search with a lower cost, and that cost. If there is none, returns `plan` and `cost`. Sets `trajectory` to the
+    /// trajectory of the returned plan.
     pub fn iterate(
         &mut self,
         problem: &Problem,
@@ -65,7 +66,7 @@ impl Solver {
         (plan, cost)
     }
 
-    /// Backward pass: computes the gains and feed-forward changes. `None` if a value is not finite.
+    /// Backward pass: computes the feedback gains and the changes of the commands. `None` if a step has no finite solution.
     fn back(
         &mut self,
         problem: &Problem,
@@ -88,7 +89,7 @@ impl Solver {
                 q_x += n * cost.slope;
                 q_xx.ger(cost.curvature, &n, &n, 1.0);
             }
-            // cost of the change from the last command, which is one of the states
+            // cost of the change of each command from the previous command, which is one of the states
             let x = trajectory.at(step);
             for (c, (at, unit)) in problem.last_commands(&x).into_iter().enumerate() {
                 let moved = plan[step][c] - x[at] / unit;
@@ -114,9 +115,9 @@ impl Solver {
     }
 }
 
-/// Hessian of the value function under the feedback δu = K δx: Q_xx + Kᵀ Q_uu K + Kᵀ Q_ux + Q_uxᵀ K.
+/// Hessian Q_xx + Kᵀ Q_uu K + Kᵀ Q_ux + Q_uxᵀ K of the cost from a step on, under the feedback δu = K δx.
 fn reduced(q_xx: Square, q_uu: &Matrix2<f64>, q_ux: &Gain, gain: &Gain) -> Square {
-    // column by column, without 16 × 16 temporaries
+    // computed column by column, without temporary 16 × 16 matrices
     let mut value = q_xx;
     let answered = q_uu * gain + q_ux;
     let (by, across) = (gain.transpose(), q_ux.transpose());
@@ -130,9 +131,10 @@ fn reduced(q_xx: Square, q_uu: &Matrix2<f64>, q_ux: &Gain, gain: &Gain) -> Squar
     value
 }
 
-/// Minimiser of the quadratic cost with the commands limited to −1..1, and its feedback gain (Tassa et al. 2014). The gain is
-/// zero for a command at its limit. As there are only two commands, all active sets are computed. `now` has the present
-/// commands. `None` if a value is not finite.
+/// Change of the two commands that minimises a quadratic cost with the commands limited to −1..1, and the feedback gain (Tassa
+/// et al. 2014). The cost has the gradient `slope` and the Hessian `curvature`; `cross` is its mixed derivative with the state.
+/// `now` has the commands before the change. A command at its limit has the gain zero. If a limit is active, every combination
+/// of limits is tried. `None` if `curvature` is singular or no solution is finite.
 fn limited(
     slope: &Vector2<f64>,
     curvature: &Matrix2<f64>,
@@ -183,7 +185,7 @@ mod tests {
         assert!((reduced(q_xx, &q_uu, &q_ux, &gain) - sum).amax() < 1e-12);
     }
 
-    /// The result is compared with the change of lowest cost on a grid within the limits.
+    /// The cost of the result is compared with the lowest cost on a grid of commands within the limits.
     #[test]
     fn limits_are_kept_at_the_least_cost() {
         let curvature = Matrix2::new(2.0, 0.6, 0.6, 1.0);

@@ -1,17 +1,18 @@
-//! The linear transition of a step, with matrix products that skip its zeros.
+//! The model of aircraft and actuators, linearised over one control step, for iLQR (iterative linear-quadratic regulator).
+//! Its matrix products skip the zeros.
 //!
-//! Half of the states belong to the actuators' filters. Their rows of the transition matrix have at most four entries. The
-//! products of the backward pass therefore take a third of the operations of dense products.
+//! Half of the states belong to the actuators' filters. Their rows of the transition matrix have at most four nonzero
+//! entries. The products of the backward pass therefore take about a third of the operations of dense products.
 
 use super::problem::{STATES, SURFACES, Square, Vector};
 use greylag_physics::servos::Surface;
 use nalgebra::{SMatrix, SVector};
 
-/// A matrix whose columns have one entry per state.
+/// A matrix with one row per state and `N` columns.
 pub(super) type Columns<const N: usize> = SMatrix<f64, STATES, N>;
 
-/// The transition δx₊ = A δx + B δu. The first eight states are the aircraft's. The other eight are those of the actuator
-/// filters of aileron and elevator.
+/// The linear transition δx₊ = A δx + B δu from the states δx before a step and the commands δu to the states δx₊ after it.
+/// The first eight states are the aircraft's. The other eight belong to the actuator filters of aileron and elevator.
 #[derive(Clone, Debug)]
 pub(super) struct Transition {
     /// Jacobian of the aircraft's states after the step with respect to the states before it (eight columns) and to the
@@ -23,21 +24,22 @@ pub(super) struct Transition {
 /// The linear filter of a surface's actuator.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Filter {
-    /// Derivatives of the deflection after the step with respect to the filter's states: the deflection, the previous
-    /// deflection, the last commanded deflection and the one before it.
+    /// Derivatives of the deflection after the step with respect to the filter's four states: the present deflection, the
+    /// previous one, the last commanded deflection and the one before it.
     own: [f64; 4],
     /// Derivative of the deflection after the step with respect to the command, rad.
     gain: f64,
-    /// Deflection of full command, rad.
+    /// Commanded deflection per unit of command, rad.
     unit: f64,
 }
 
 impl Filter {
-    /// The filter of the surface `of`, linear about the deflection after the step and the commanded deflection (rad).
+    /// The linearised filter of the surface `of`. `deflection` is the deflection after the step and `commanded` is the commanded
+    /// deflection, both in rad.
     pub fn new(of: &Surface, deflection: f64, commanded: f64) -> Filter {
         let [b0, a1, a2] = of.filter;
         let unit = of.travel.slope(commanded);
-        // a surface at its travel limit stays there
+        // at a travel limit the deflection does not change with the filter's states or the command
         if of.travel.reaches(deflection) {
             Filter { own: [-a1, -a2, 2.0 * b0, b0], gain: b0 * unit, unit }
         } else {
@@ -95,7 +97,7 @@ impl Transition {
         out
     }
 
-    /// Adds the row of A for the aircraft's state `row`, multiplied by `by`, to `to`.
+    /// Adds row number `row` of A, multiplied by `by`, to `to`. The row must be one of the first eight.
     pub fn add_row(&self, row: usize, by: f64, to: &mut Vector) {
         let of: SVector<f64, 10> = self.aircraft.row(row).transpose();
         for i in 0..8 {

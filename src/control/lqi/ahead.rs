@@ -1,4 +1,4 @@
-//! The LQI's control law over the coming steps, for many simulated aircraft at once, one per vector lane.
+//! The LQI's control law over the steps of a prediction, evaluated for many simulated aircraft at once, one per vector lane.
 
 use super::design::{RUDDER_STATES, STATES};
 use super::{AIRSPEED_KP, PITCH_RATE, ROLL_RATE, ROUNDING};
@@ -9,12 +9,12 @@ use greylag_physics::airframe::Incidence;
 use greylag_physics::servos::ActuatorFigures;
 use greylag_physics::{ActuatorState, Airframe, Command, State};
 
-/// The gain of one flight condition and the steady state to which it regulates.
+/// The gain for one flight condition, and the steady state to which it regulates.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Law {
-    /// Gain rows of aileron and elevator, rad per unit of each state.
+    /// Gains of aileron and elevator on the states, rad of deflection per unit of the state.
     gain: [[f64; STATES]; 2],
-    /// p q r α β of the steady state, rad/s and rad.
+    /// Values of p, q, r, α, β in the steady state, rad/s and rad.
     steady: [f64; 5],
     /// Deflections of aileron and elevator in the steady state, rad.
     deflection: [f64; 2],
@@ -29,21 +29,22 @@ pub(super) struct Law {
 struct RudderLaw {
     /// Gains of aileron and elevator on the rudder's filter states.
     coupling: [[f64; RUDDER_STATES]; 2],
-    /// Gains of the rudder on the states other than its filter states. `own` has the gains on its filter states.
+    /// Gains of the rudder on the states on which aileron and elevator depend.
     row: [f64; STATES],
+    /// Gains of the rudder on its own filter states.
     own: [f64; RUDDER_STATES],
     /// Deflection of the rudder in the steady state, rad.
     deflection: f64,
 }
 
-/// Surface travels that convert deflections to commands, and the angle of attack above which the law lowers the nose.
+/// Actuator travels, which convert deflections to commands, and the angle of attack above which the law lowers the nose.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Surfaces {
     pub figures: ActuatorFigures,
     pub incidence: Incidence,
 }
 
-/// Reference and integrator states of the law.
+/// Reference attitude and integrator states of the control law.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Inner<R> {
     /// Reference roll and pitch, rad.
@@ -53,7 +54,7 @@ pub(super) struct Inner<R> {
 }
 
 impl Surfaces {
-    /// The surfaces of an airframe file.
+    /// The actuators and the limit of the angle of attack of an airframe file.
     pub(super) fn of(airframe: &Airframe) -> Surfaces {
         Surfaces { figures: airframe.actuators, incidence: airframe.incidence }
     }
@@ -68,7 +69,7 @@ impl Law {
         rudder: None,
     };
 
-    /// Commands of aileron, elevator and rudder, without limits.
+    /// Commands of aileron, elevator and rudder, not limited to −1..1. `previous` holds the last two commands, newest first.
     #[inline(always)]
     pub(super) fn surfaces<R: Real>(
         &self,
@@ -139,8 +140,9 @@ impl Law {
 }
 
 impl RudderLaw {
-    /// Returns the rudder's deflection (rad), where `held` is its deflection in the steady state. Adds the contribution of the
-    /// rudder's filter states `y` to the deflections `u` of aileron and elevator.
+    /// Returns the rudder's deflection (rad); `held` is its deflection in the steady state. Adds to the deflections `u` of
+    /// aileron and elevator the contribution of the rudder's filter states `y`: the present and previous deflection and the
+    /// last two commands.
     #[inline(always)]
     fn act<R: Real>(&self, held: R, x: &[R; STATES], y: &[R; RUDDER_STATES], u: &mut [R; 2]) -> R {
         let mut yaw = held;
@@ -179,11 +181,11 @@ impl From<Entry> for Law {
     }
 }
 
-/// Number of steps for which one gain is held.
+/// Number of steps for which one law is used before the next one is taken from the gain schedule.
 pub(super) const HOLD: usize = 5;
 
-/// The part of the LQI's prediction that is common to all simulated aircraft. The gains are scheduled along the reference at the
-/// airspeed of the tick. The integrators keep their values of the tick.
+/// The LQI's data that are the same for all simulated aircraft of a prediction. The gains are scheduled along the reference
+/// attitude at the present airspeed. The integrators keep their present values.
 #[derive(Clone, Debug)]
 pub(crate) struct Ahead {
     pub(super) laws: Vec<Law>,
@@ -220,7 +222,8 @@ impl Ahead {
         self.inner.reference
     }
 
-    /// The command at `step` for a simulated aircraft. Advances the aircraft's `reference` (rad).
+    /// Returns the LQI's command at `step` for a simulated aircraft. Moves the aircraft's `reference` (roll and pitch, rad)
+    /// towards the commanded attitude by one step.
     #[inline(always)]
     pub(crate) fn command<R: Real>(
         &self,

@@ -1,4 +1,4 @@
-//! LQI design at one flight condition.
+//! Design of the LQI (linear quadratic controller with integral action) at one flight condition.
 
 use nalgebra::{RowSVector, SMatrix, SVector};
 
@@ -24,13 +24,14 @@ pub(super) struct Gain {
     pub rudder: Option<RudderGain>,
 }
 
-/// The rudder's part of the gain.
+/// The rows and columns that a rudder adds to the gain.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RudderGain {
-    /// Gains of aileron and elevator on the rudder's filter states.
+    /// Gains from the rudder's four states to aileron and elevator.
     pub coupling: SMatrix<f64, 2, RUDDER_STATES>,
-    /// Gains of the rudder on the states other than its filter states. `own` has the gains on its filter states.
+    /// Gains from the other states to the rudder.
     pub row: RowSVector<f64, STATES>,
+    /// Gains from the rudder's four states to the rudder.
     pub own: RowSVector<f64, RUDDER_STATES>,
 }
 
@@ -45,7 +46,7 @@ impl Gain {
         Gain { surfaces: SMatrix::zeros(), rudder }
     }
 
-    /// Adds `other` multiplied by `part`.
+    /// Adds `other` multiplied by `part` to this gain.
     pub fn add(&mut self, other: &Gain, part: f64) {
         self.surfaces += other.surfaces * part;
         if let (Some(rudder), Some(other)) = (&mut self.rudder, &other.rudder) {
@@ -56,14 +57,14 @@ impl Gain {
     }
 }
 
-/// Indices of φ θ p q r α β in the state of eq. (4). Airspeed is a scheduling variable and is not fed back.
+/// Indices of φ θ p q r α β in the model's state. Airspeed is a scheduling variable and is not fed back.
 const ATTITUDE_STATES: [usize; 7] = [0, 1, 3, 4, 5, 6, 7];
 
-/// Cost scales by Bryson's rule. The weight of each term is one over the square of its scale. A larger scale therefore gives
-/// a softer loop.
+/// Cost scales by Bryson's rule. The weight of a cost term is one over the square of its scale. A larger scale therefore gives
+/// the term less weight.
 ///
-/// The scales were tuned on the `jsbsim` model for a small settled error over the target file. The settled error is not
-/// sensitive to them.
+/// The scales were tuned on the model `params/x8/jsbsim.toml` for a small settled error, the mean attitude error over the last
+/// fifth of a flight to a commanded attitude. The settled error is not sensitive to the scales.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weights {
     /// Attitude error scale, rad.
@@ -90,9 +91,9 @@ impl Weights {
         sideslip_by_rudder: 0.03,
         deflection: 0.3,
     };
-    /// Weights of softer loops with a larger delay margin. In pitch the margin is 104 ms instead of the default's 46 ms. With
-    /// ArduPlane's filter and sampling it is 78 ms instead of 32 ms (`examples/delay_margin.rs`). Still softer weights (0.15,
-    /// 0.1, 0.15) have 200 ms.
+    /// Weights of softer loops with a larger delay margin. In pitch the margin is 104 ms; with the default weights it is 46 ms.
+    /// With ArduPlane's filter and sampling it is 78 ms; with the default weights it is 32 ms (`examples/delay_margin.rs`).
+    /// Weights of 0.15 (attitude), 0.1 (integral) and 0.15 (deflection) give 200 ms.
     pub const DAMPED: Weights =
         Weights { attitude: 0.08, integral: 0.05, deflection: 0.2, ..Weights::DEFAULT };
 }
@@ -112,11 +113,11 @@ pub(super) fn design(model: &GreyBox, trim: &Trim, altitude: f64, w: &Weights) -
     })
 }
 
-/// A linear system with its state-feedback gain: x₊ = a x + b u, u = −k x.
+/// The matrices a, b and k of a discrete linear system with state feedback: x₊ = a x + b u, u = −k x.
 type Closed<const N: usize, const M: usize> =
     (SMatrix<f64, N, N>, SMatrix<f64, N, M>, SMatrix<f64, M, N>);
 
-/// Linear system and gain of one flight condition.
+/// The matrices a, b and k of the design at one flight condition.
 #[expect(clippy::large_enum_variant, reason = "one lives at a time, while a gain is designed")]
 pub(super) enum Loops {
     /// Two inputs: aileron and elevator.
@@ -125,7 +126,7 @@ pub(super) enum Loops {
     Three(SMatrix<f64, ALL, ALL>, SMatrix<f64, ALL, 3>, SMatrix<f64, 3, ALL>),
 }
 
-/// Linear system and gain at `trim` and `altitude` (m). `None` if the model cannot be stabilised at this trim.
+/// Designs the gain at `trim` and `altitude` (m). `None` if the model cannot be stabilised at this trim.
 pub(super) fn loops(model: &GreyBox, trim: &Trim, altitude: f64, w: &Weights) -> Option<Loops> {
     let linear = linearise(model, trim, altitude);
     let figures = &model.airframe.actuators;
@@ -146,7 +147,8 @@ pub(super) fn loops(model: &GreyBox, trim: &Trim, altitude: f64, w: &Weights) ->
 /// A surface of the design: its column in the linear model, the index of its first state, and its actuator filter.
 type Actuated<'a> = (usize, usize, &'a Surface);
 
-/// Designs the gain for N states and M `surfaces`. `None` if the system cannot be stabilised.
+/// Designs the gain for N states and M `surfaces`, with the sideslip scale `sideslip` (rad). `None` if the system cannot be
+/// stabilised.
 fn solve<const N: usize, const M: usize>(
     linear: &Linear,
     surfaces: [Actuated; M],

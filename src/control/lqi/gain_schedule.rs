@@ -1,4 +1,5 @@
-//! The gain schedule: trims and gains over airspeed, roll and pitch.
+//! The gain schedule of the LQI (linear-quadratic regulator with integral action): trims and gains over airspeed, roll and
+//! pitch.
 
 use rayon::prelude::*;
 
@@ -69,21 +70,21 @@ pub(super) struct Entry {
     pub gain: Gain,
 }
 
-/// Grid entries, with airspeed as the slowest index, and the minimum airspeeds of each attitude.
+/// Grid entries, with airspeed as the slowest index, and the lowest airspeeds of each attitude.
 #[derive(Clone, Debug)]
 pub(super) struct Schedule {
     grid: Grid,
     entries: Vec<Entry>,
-    /// Minimum airspeed (m/s) of each attitude with a margin before the stall.
+    /// Lowest airspeed (m/s) of each attitude at which the angle of attack is at most `Incidence::comfortable`.
     comfortable: Vec<f64>,
-    /// Minimum airspeed (m/s) of each attitude without a margin.
+    /// Lowest airspeed (m/s) of each attitude at which the angle of attack is at most `Incidence::tolerable`.
     tolerable: Vec<f64>,
 }
 
 impl Axis {
     /// The grid of an angle from `low` to `high`, both in units of the grid spacing.
     fn attitude(low: f64, high: f64) -> Axis {
-        // in units of 30°, in which multiples of 30° are exact
+        // computed from 30° instead of 10°, so that a multiple of 30° has the same bits as that multiple of π/6
         let first = low / 3.0 * std::f64::consts::FRAC_PI_6;
         Axis { first, step: std::f64::consts::PI / 18.0, count: (high - low) as usize + 1 }
     }
@@ -155,13 +156,13 @@ impl Schedule {
         sum
     }
 
-    /// The minimum airspeed (m/s) of an attitude (rad) with a margin before the stall.
+    /// The lowest airspeed (m/s) of an attitude (rad) at which the angle of attack is at most `Incidence::comfortable`.
     pub(super) fn comfortable_airspeed(&self, roll: f64, pitch: f64) -> f64 {
         self.over_attitude(&self.comfortable, roll, pitch)
     }
 
-    /// The largest fraction (0..=1) of `roll` (rad) whose minimum airspeed without a margin is at most `airspeed` (m/s), at the
-    /// pitch angle `pitch` (rad).
+    /// The largest fraction (0..=1) of `roll` (rad) at which steady flight at `airspeed` (m/s) and `pitch` (rad) requires at most
+    /// the angle of attack `Incidence::tolerable`. The fraction is accurate to 1/256.
     pub(super) fn tolerable_part(&self, airspeed: f64, roll: f64, pitch: f64) -> f64 {
         let allowed =
             |part: f64| self.over_attitude(&self.tolerable, part * roll, pitch) <= airspeed;

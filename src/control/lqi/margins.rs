@@ -1,4 +1,5 @@
-//! Gain, phase and delay margins of each LQI loop, with the other loops closed.
+//! Gain, phase and delay margins of the LQI, a linear-quadratic regulator with integral action. There is one loop per surface.
+//! Each loop is opened at its surface while the other loops stay closed.
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,7 +10,8 @@ use super::Weights;
 use super::design::{ALL, Loops, STATES, loops};
 use greylag_model::{GreyBox, STEP, Trim, TrimError};
 
-/// Number of frequencies at which the loop transfer function is evaluated, from [`LOWEST`] to half the sampling frequency.
+/// Number of frequencies at which a loop transfer function is evaluated. They are spaced logarithmically from [`LOWEST`] to half
+/// the sampling frequency.
 const FREQUENCIES: usize = 1500;
 /// Lowest frequency evaluated, rad/s.
 const LOWEST: f64 = 0.05;
@@ -19,8 +21,8 @@ const LOWEST: f64 = 0.05;
 pub struct LoopMargins {
     /// The surface at which the loop is opened.
     pub surface: &'static str,
-    /// Lower and upper gain margin: the factors on the loop gain between which the loop stays stable. The upper one is infinite
-    /// if there is no limit.
+    /// Lower and upper gain margin: the loop stays stable if its gain is multiplied by a factor between the two. The lower one is
+    /// 0 and the upper one infinite if there is no such limit.
     pub gain: [f64; 2],
     /// Phase margin, rad. It is π if the loop gain never crosses 1.
     pub phase: f64,
@@ -36,7 +38,7 @@ pub enum MarginsError {
     /// The flight condition has no trim.
     #[error(transparent)]
     Trim(#[from] TrimError),
-    /// No gain stabilises the flight condition.
+    /// No feedback gain stabilises the model in this flight condition.
     #[error(
         "model {model} cannot be stabilised at {airspeed_mps:.1} m/s: see that its surfaces act"
     )]
@@ -106,7 +108,7 @@ fn ratio<const N: usize, const M: usize>(
     (0..FREQUENCIES).filter_map(at).collect()
 }
 
-/// The margins of a loop from its sampled transfer function, with linear interpolation between samples.
+/// The margins of a loop from samples of its transfer function at increasing frequencies (rad/s), by linear interpolation.
 fn of_loop(surface: &'static str, ratio: &[(f64, Complex<f64>)]) -> LoopMargins {
     let mut margins = LoopMargins {
         surface,
@@ -143,7 +145,7 @@ fn of_loop(surface: &'static str, ratio: &[(f64, Complex<f64>)]) -> LoopMargins 
 }
 
 impl LoopMargins {
-    /// Records a gain margin: multiplied by `factor`, the loop transfer function passes through −1.
+    /// Records that the loop transfer function passes through −1 if it is multiplied by `factor`.
     fn note_gain(&mut self, factor: f64) {
         let [least, most] = &mut self.gain;
         if factor < 1.0 { *least = least.max(factor) } else { *most = most.min(factor) }

@@ -1,4 +1,4 @@
-//! LQI: linear-quadratic attitude control with integral action, with gains scheduled over the envelope.
+//! LQI: linear-quadratic attitude control with integral action. The gains are scheduled over airspeed, roll and pitch.
 
 mod gain_schedule;
 mod margins;
@@ -18,22 +18,22 @@ use greylag_model::{GreyBox, STEP};
 use greylag_physics::Command;
 pub use margins::{LoopMargins, MarginsError, margins};
 
-/// Largest rate of the roll reference, rad/s. The limit turns command steps into ramps that the surfaces can follow, which
-/// keeps the integrated errors small.
+/// Largest rate of the roll reference, rad/s. The limit turns a step of the target into a ramp that the aircraft can follow.
+/// This keeps the integrals of the errors small.
 const ROLL_RATE: f64 = 0.8;
 /// Largest rate of the pitch reference, rad/s.
 const PITCH_RATE: f64 = 0.5;
-/// Time constant of the filter that rounds the ramps, s.
+/// Time constant of the reference's approach to the target, s. It rounds the end of a ramp.
 const ROUNDING: f64 = 0.35;
 /// Proportional gain from the airspeed error to the throttle, s/m.
 const AIRSPEED_KP: f64 = 0.3;
 /// Integral gain from the airspeed error to the throttle, 1/m.
 const AIRSPEED_KI: f64 = 0.05;
 
-/// The steady state to which the law regulates.
+/// The steady state to which the control law regulates.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Goal {
-    /// Target roll and pitch, rad, with the roll reduced where the airspeed requires it.
+    /// Target roll and pitch, rad. The roll is reduced if the airspeed is too low for it.
     pub attitude: [f64; 2],
     /// p q r α β of the steady flight at this attitude, rad/s and rad.
     pub steady: [f64; 5],
@@ -51,20 +51,20 @@ pub struct Lqi {
     last: Option<Given>,
 }
 
-/// Data of the last command. If another command was flown, they serve to correct the reference and the integrals.
+/// Data of the last command. They correct the reference and the integrals if a different command was flown.
 #[derive(Clone, Copy, Debug)]
 struct Given {
     /// Roll and pitch of the aircraft, rad.
     attitude: [f64; 2],
-    /// Last change of the integrals, rad s.
+    /// Last change of the integrals of the roll and pitch errors, rad s.
     added: [f64; 2],
     /// Gains from the reference roll to the aileron and from the reference pitch to the elevator, rad/rad.
     by_reference: [f64; 2],
 }
 
 impl Lqi {
-    /// Designs the controller for `model` over its envelope and a margin around it. With a rudder the sideslip is held at zero.
-    /// Without a rudder a turn is flown with the sideslip of its equilibrium.
+    /// Designs the controller for `model` over its envelope and a margin around it. An aircraft with a rudder holds zero
+    /// sideslip. An aircraft without one flies a turn with the sideslip at which the turn is in equilibrium.
     ///
     /// # Errors
     ///
@@ -73,7 +73,7 @@ impl Lqi {
         Lqi::weighted("lqi", model, &Weights::DEFAULT)
     }
 
-    /// Designs the controller with `weights` and registers it under `name`.
+    /// Designs the controller with the LQ `weights`. `name` is the name of the controller in reports.
     ///
     /// # Errors
     ///
@@ -104,18 +104,18 @@ impl Lqi {
                 *x += step;
             }
         }
-        // a reference that started at an unknown attitude starts again at the next tick
+        // a reference that started at an unknown attitude (NaN) is dropped and starts again at the next step
         self.reference = Some(reference).filter(|x| x.iter().all(|x| x.is_finite()));
         reference
     }
 
-    /// Roll and pitch (rad) to which the reference moves. If the airspeed is too low for the commanded bank, the bank is reduced.
+    /// Roll and pitch (rad) to which the reference moves. If the airspeed is too low for the target roll, the roll is reduced.
     fn wanted(&self, seen: &Observation, target: &Target) -> [f64; 2] {
         let part = self.schedule.tolerable_part(seen.state.airspeed, target.roll, target.pitch);
         [part * target.roll, target.pitch]
     }
 
-    /// The airspeed to be held (m/s): the target airspeed, or the minimum airspeed of the commanded attitude if it is higher.
+    /// The airspeed to be held (m/s): the target airspeed, or the minimum airspeed of the target attitude if that is higher.
     fn airspeed(&self, target: &Target) -> f64 {
         self.schedule.comfortable_airspeed(target.roll, target.pitch).max(target.airspeed)
     }
@@ -127,7 +127,9 @@ impl Lqi {
         Goal { attitude, steady }
     }
 
-    /// Writes the LQI's law for the coming steps from `seen` into `ahead`.
+    /// Writes the control laws of the coming steps (trims and gains) into `ahead`, with the present reference, targets and
+    /// integrals. The LQI's commands in a prediction follow from them. The gains are those of the future reference attitudes at
+    /// the present airspeed.
     pub(crate) fn look_ahead(&self, seen: &Observation, target: &Target, ahead: &mut Ahead) {
         let mut follower = self.clone();
         let now = [seen.state.roll, seen.state.pitch];
@@ -145,8 +147,8 @@ impl Lqi {
         }
     }
 
-    /// Updates the LQI after another controller's command was chosen for this tick. The reference restarts at the present
-    /// attitude. The integrators return to their values in `before`.
+    /// Updates the LQI after another controller's command was chosen for this step. The reference restarts at the present
+    /// attitude. The integrals of the attitude errors return to their values in `before`.
     pub(crate) fn hand_over(&mut self, before: &Lqi, seen: &Observation) {
         self.integral = before.integral;
         self.reference = Some([seen.state.roll, seen.state.pitch]);
@@ -179,9 +181,9 @@ impl Controller for Lqi {
         self.last = None;
     }
 
-    /// Anti-windup by conditioning (Hanus, Kinnaert and Henrotte, Automatica 23, 1987). The reference moves back to the value
-    /// that would have given the flown command, but not past the aircraft's attitude. The last increment of the integral is
-    /// subtracted again.
+    /// Anti-windup by conditioning (Hanus, Kinnaert and Henrotte, Automatica 23, 1987). If another aileron or elevator command
+    /// was flown, the reference of that axis moves to the value that would have given the flown command, but not past the
+    /// aircraft's attitude. The last increment of the axis's integral is subtracted again.
     fn overruled(&mut self, by: &Overruled) {
         let (Some(last), Some(reference)) = (self.last.take(), &mut self.reference) else { return };
         let Overruled { wanted, flown } = by;
@@ -209,7 +211,7 @@ impl Controller for Lqi {
         let raw =
             law.surfaces(&inner, &seen.state, &seen.actuators, &seen.previous, &self.surfaces);
         let error = [seen.state.roll - roll, seen.state.pitch - pitch];
-        // conditional integration: the integral of an axis does not wind up while its command is saturated
+        // conditional integration: the integral of an axis is constant while its command is saturated
         let added: [f64; 2] = std::array::from_fn(|axis| {
             let free = raw[axis].abs() < 1.0 && error[axis].is_finite();
             if free { error[axis] * STEP } else { 0.0 }

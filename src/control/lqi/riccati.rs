@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, SMatrix};
 
-/// The gain K of u = −K x that minimises Σ xᵀqx + uᵀru under x₊ = ax + bu. `None` if the doubling does not converge, because
-/// the pair cannot be stabilised.
+/// The gain K of the feedback u = −K x that minimises Σ xᵀqx + uᵀru for x₊ = ax + bu. `None` if `r` is singular, or if the
+/// doubling does not converge because the feedback cannot stabilise the system.
 ///
 /// Each iteration doubles the horizon: E. Chu, H. Fan, W. Lin, C. Wang, "Structure-preserving algorithms for periodic
 /// discrete-time algebraic Riccati equations", Int. J. Control 77 (2004).

@@ -1,4 +1,8 @@
 //! The files of a policy folder: `actor.safetensors` and, for planners, `critic1.safetensors` and `critic2.safetensors`.
+//!
+//! A target (commanded attitude) is easy if |roll| < 45° and |pitch| < 25°. It is hard if |roll| is 45..60° and |pitch| 25..30°.
+//! The settled error of a flight to a target is the error in the last fifth of the flight: the mean of the RMS errors of roll
+//! and pitch.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,7 +16,7 @@ use greylag_model::weights;
 use greylag_num::Dense;
 use greylag_physics::Airframe;
 
-/// The files of a policy folder. The actor is written last: its presence shows that the files before it are complete.
+/// Names of the files in the order of writing. The actor is last: if it exists, the other files are complete.
 const FILES: [&str; 3] = ["critic1.safetensors", "critic2.safetensors", "actor.safetensors"];
 
 /// Index of the actor in [`FILES`].
@@ -28,19 +32,19 @@ pub struct Origin {
     pub airframe: String,
     /// Name of the model in which the policy was trained, or `jsbsim`.
     pub model: String,
-    /// SHA-256 of that model's files, hexadecimal. Empty for JSBSim.
+    /// SHA-256 of the files of this model, hexadecimal. Empty for JSBSim.
     pub model_sha256: String,
     /// Random seed of the training run.
     pub seed: u64,
     /// Number of environment steps of the training run.
     pub steps: u64,
-    /// Evaluation at the end of training. `None` if there was no evaluation.
+    /// Evaluation of the policy in its training environment. `None` if there was no evaluation.
     pub evaluation: Option<Evaluated>,
     /// Name and version of the program that trained the policy.
     pub program: String,
 }
 
-/// Evaluation of a policy at the end of its training, in the training environment.
+/// Evaluation of a policy in the environment of its training.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Evaluated {
@@ -50,7 +54,7 @@ pub struct Evaluated {
     pub easy_deg: f64,
     /// Mean settled error on hard targets, degrees.
     pub hard_deg: f64,
-    /// Fraction of the targets on which the aircraft was lost.
+    /// Fraction of the targets with a settled error above 10°. The settled error is 180° if the aircraft was lost.
     pub divergence_rate: f64,
 }
 
@@ -97,7 +101,7 @@ impl Origin {
 }
 
 impl Agent {
-    /// The files of a policy folder as names and contents, in the order in which they must be written.
+    /// Names and contents of the policy's files, in the order in which they must be written.
     ///
     /// # Errors
     ///
@@ -113,7 +117,7 @@ impl Agent {
             .collect()
     }
 
-    /// Loads the policy in `folder` for `airframe`. The critics are optional, but if one exists, the other must exist too.
+    /// Loads the policy in `folder` for `airframe`. A folder may have no critics, but not only one of the two.
     ///
     /// # Errors
     ///
@@ -145,7 +149,7 @@ impl Agent {
     }
 }
 
-/// The network of a file and its provenance.
+/// Reads a policy file and returns its network and its provenance.
 fn read(path: &Path) -> Result<(Dense, Origin), AgentError> {
     let bytes = std::fs::read(path).map_err(|why| AgentError::Read { path: path.into(), why })?;
     let content = |why: String| AgentError::Content { path: path.into(), why };

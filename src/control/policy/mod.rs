@@ -1,6 +1,8 @@
-//! A trained policy: its observation, networks, files, and the controller that flies it.
+//! A trained policy: a neural network that computes the command of each tick. The modules contain its inputs (observation),
+//! its networks and its files. [`Policy`] is the controller that flies it.
 //!
-//! The policy is that of section IV-B of \[GSFM26\]. The training is in `learn` and is not needed in flight.
+//! The policy is that of section IV-B of the paper \[GSFM26\] (see `src/lib.rs`). The training is in `learn` and is not needed
+//! in flight.
 
 mod file;
 mod networks;
@@ -16,18 +18,19 @@ use crate::{Controller, Observation, Target};
 use greylag_num::dense::Units;
 use greylag_physics::Command;
 
-/// The networks of a policy with their provenance.
+/// The networks of a policy and their provenance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Agent {
     /// The actor network π.
     pub actor: Arc<Actor>,
-    /// The two critics Q1 and Q2. `None` if the folder has none. Without critics only the actor can fly.
+    /// The two critics Q1 and Q2: estimates of the sum of future rewards. `None` if the policy's folder has none. Controllers
+    /// that use critics then cannot be built.
     pub critics: Option<Arc<[Critic; 2]>>,
-    /// Provenance stored in the policy's files.
+    /// Provenance that is stored in the policy's files.
     pub origin: Origin,
 }
 
-/// The controller that flies the actor's action at every tick.
+/// The controller that commands the actor's action at every tick.
 #[derive(Clone, Debug)]
 pub struct Policy {
     actor: Arc<Actor>,
@@ -87,7 +90,7 @@ mod tests {
         let there = observe(&seen.state, &seen.actuators, &target);
         let expected: Command = command(actor.act(&mut Units::new(0.0), &there));
         let given = policy.command(&seen, &target);
-        // tolerance of single precision for sums of 300 terms
+        // the tolerance covers single-precision rounding in sums of 300 terms
         assert!((given.aileron - expected.aileron).abs() < 1e-5);
         assert!((given.elevator - expected.elevator).abs() < 1e-5);
         assert!((given.throttle - expected.throttle).abs() < 1e-5);

@@ -80,7 +80,7 @@ impl Actor {
         &mut self.network
     }
 
-    /// The actions (−1..1) for observations in vector lanes or double precision.
+    /// The action (−1..1) for the observation of one aircraft, or of several aircraft in the lanes of vectors.
     #[inline(always)]
     pub fn act<R: Real>(&self, units: &mut Units<R>, observed: &[R; OBSERVATIONS]) -> [R; ACTIONS] {
         let answer = self.network.evaluate_in(units, observed);

@@ -1,4 +1,5 @@
-//! Observation of a policy: the fifteen numbers of eq. (28) of \[GSFM26\] and the airspeed error, scaled to order one.
+//! The observation, which is the input of a policy (a neural network). It has the fifteen components of eq. (28) of \[GSFM26\]
+//! and the airspeed error, all scaled to order one.
 
 use crate::Target;
 use greylag_num::Real;
@@ -7,19 +8,18 @@ use greylag_physics::{ActuatorState, State};
 /// Number of components of an observation.
 pub const OBSERVATIONS: usize = 16;
 
-/// Scale of each component in the order of [`observe`], in rad, m/s, rad/s and throttle (0..1). The components are divided by
-/// these scales. In brisk flight, at full deflection and at the start of a hard target they are then of order one.
+/// Scale by which each component is divided, in the order of [`observe`], in rad, m/s, rad/s and throttle (0..1). In brisk
+/// flight, at full deflection and after a step to a large commanded angle, the scaled components are of order one.
 pub const UNIT: [f64; OBSERVATIONS] =
     [1.0, 0.5, 4.0, 2.0, 1.0, 1.0, 0.2, 0.2, 0.5, 10.0, 0.5, 10.0, 0.5, 0.5, 0.25, 4.0];
 
-/// The scaled observation, in vector lanes, double precision or dual numbers. The order is the state φ θ V p q r α β, the
-/// actuators δa δ̇a δe δ̇e δt, then the errors φ* − φ, θ* − θ and V_a* − V_a.
+/// The scaled observation. Its components are the state φ θ V p q r α β, the actuators δa δ̇a δe δ̇e δt, then the errors φ* − φ,
+/// θ* − θ and V_a* − V_a, where * marks a commanded value. Airspeed is relative to 16.67 m/s, throttle to one half. `R` is
+/// double precision, a SIMD vector or a dual number.
 ///
-/// The paper observes φ* and θ* instead of the errors. The information is the same, because φ and θ are observed too. The
-/// errors have their own scales, because they must converge to zero. Airspeed is relative to 16.67 m/s, throttle to one half.
-///
-/// In the paper the commanded airspeed is the same in every episode and is not observed. A policy trained in this way holds
-/// that airspeed whatever airspeed is commanded.
+/// Departs from the paper, which observes φ* and θ* instead of the errors. The information is the same, because φ and θ are
+/// observed too. The errors have scales of their own, because they must converge to zero. In the paper the commanded airspeed
+/// is the same in every episode and is not observed.
 #[inline(always)]
 pub fn observe<R: Real>(
     state: &State<R>,

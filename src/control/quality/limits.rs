@@ -5,16 +5,16 @@ use serde::Serialize;
 use super::{Moment, Track};
 use greylag_physics::Airframe;
 
-/// Accepted transient excess of load factor and angle of attack, as a fraction of the limit.
+/// Accepted excess of load factor and angle of attack in transients, as a fraction of the limit.
 pub const TRANSIENT: f64 = 0.05;
 
-/// Tolerance for rounding of a command's rate, as a fraction of the limit.
+/// Tolerance for rounding errors in the rate of a command, as a fraction of its limit.
 const ROUNDING: f64 = 1e-9;
 
 /// Limits against which a flight is measured. A limit that the airframe file does not state is infinite.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Limits {
-    /// Largest |bank|, degrees.
+    /// Largest magnitude of the bank, degrees.
     pub bank_deg: f64,
     /// Smallest and largest pitch, degrees.
     pub pitch_deg: [f64; 2],
@@ -22,11 +22,11 @@ pub struct Limits {
     pub load_factor: [f64; 2],
     /// Angle of attack at which the wing stalls, degrees.
     pub stall_deg: f64,
-    /// Largest |sideslip|, degrees.
+    /// Largest magnitude of the sideslip, degrees.
     pub sideslip_deg: f64,
     /// Smallest and largest airspeed, m/s.
     pub airspeed_mps: [f64; 2],
-    /// Fastest change of a surface command (−1..1), 1/s.
+    /// Slew limit: largest rate of a surface command (−1..1), 1/s.
     pub slew_per_s: f64,
 }
 
@@ -49,7 +49,7 @@ pub struct OutsideS {
     pub slow: f64,
     /// Time above the largest airspeed, s.
     pub fast: f64,
-    /// Time in which a surface command changes faster than its slew limit, s.
+    /// Time in which a surface command changes faster than the slew limit, s.
     pub slew: f64,
     /// Time outside any of the limits, s.
     pub any: f64,
@@ -88,8 +88,8 @@ impl Limits {
         }
     }
 
-    /// Whether the extremes of a flight stay within the limits of load factor and angle of attack (degrees) plus [`TRANSIENT`].
-    /// Only the upper limit of the angle of attack counts.
+    /// Whether a flight kept the limits of load factor and angle of attack, with the allowance [`TRANSIENT`]. The arguments are
+    /// the smallest and largest values of the flight, `alpha_deg` in degrees. The smallest angle of attack is not checked.
     pub fn kept(&self, load_factor: [f64; 2], alpha_deg: [f64; 2]) -> bool {
         let room = |limit: f64| limit.abs() * TRANSIENT;
         let [least, most] = self.load_factor;
@@ -117,7 +117,8 @@ impl Limits {
         total
     }
 
-    /// Whether a sample with surface rate `slew` (1/s) lies outside each limit, in the order of [`OutsideS::each`].
+    /// For each limit, in the order of [`OutsideS::each`]: whether the sample lies outside it. `slew` is the largest rate of the
+    /// surface commands, 1/s.
     fn beyond(&self, m: &Moment, slew: f64) -> [bool; 9] {
         let [roll, pitch] = m.attitude.map(f64::to_degrees);
         [

@@ -1,4 +1,4 @@
-//! The quality measures with the names, units and definitions used in tables, pages and JSON.
+//! Measures of how well a controller flies to a target, with the names, units and definitions used in tables, pages and JSON.
 
 use super::Quality;
 
@@ -29,7 +29,7 @@ pub enum Worse {
 }
 
 impl Measure {
-    /// The worst of `values`. NaN if there are none.
+    /// The worst of `values`. NaN if there are no values.
     pub fn worst(&self, values: &[f64]) -> f64 {
         let pick = match self.worse {
             Worse::More => f64::max,

@@ -17,13 +17,14 @@ pub use measures::{MEASURES, Measure, Worse, measure};
 /// Attitude error within which a target counts as reached, degrees.
 pub const REACHED_DEG: f64 = 1.0;
 
-/// Settling band as a fraction of the step.
+/// Settling band of the combined roll and pitch error, as a fraction of the step (the change of attitude from the start to the
+/// target).
 const BAND: f64 = 0.05;
 
 /// Overshoot that counts as small, as a fraction of the step.
 const LITTLE: f64 = 0.03;
 
-/// Sum of the roll and pitch errors that is assumed for the remaining time after a loss of the aircraft, degrees.
+/// Sum of |roll error| and |pitch error| that is assumed for the remaining time after a loss of the aircraft, degrees.
 const LOST_DEG: f64 = 360.0;
 
 /// One sample of a flight. Unknown values are NaN, which the measures ignore.
@@ -133,11 +134,11 @@ pub struct Quality {
     pub travel: PerControl,
     /// Mean square of each command's rate, 1/s².
     pub mean_square_rate: PerControl,
-    /// Fraction of the ticks at which each command is saturated.
+    /// Fraction of the ticks (sample intervals) in which each command is at its smallest or largest value.
     pub saturated: PerControl,
-    /// Fraction of the ticks at which any surface command is saturated.
+    /// Fraction of the ticks in which any surface command is at its smallest or largest value.
     pub surface_saturated: f64,
-    /// Time outside each limit, s.
+    /// Time outside each limit of the aircraft, s.
     pub outside_s: OutsideS,
     /// Whether load factor and angle of attack stayed within their limits plus [`TRANSIENT`]. False if the aircraft was lost.
     pub kept: bool,
@@ -170,7 +171,7 @@ impl Track {
         let lost = self.lost_s > 0.0;
         Quality {
             step_deg: first.map(|e| -e),
-            // the aircraft may be lost before the first sample
+            // if the aircraft is lost before the first sample, only the assumed error after the loss counts
             error_integral_deg_s: total(
                 [self.integral(&errors), LOST_DEG * self.lost_s].into_iter(),
             ),
@@ -223,7 +224,8 @@ impl Track {
         away.map_or(0.0, |k| self.moments[k].time_s - start) + self.lost_s
     }
 
-    /// Every sample except the last, with the previous command and the time to the next sample, s.
+    /// The ticks (sample intervals): every sample except the last, with the previous command and the time to the next sample,
+    /// s.
     fn ticks(&self) -> impl Iterator<Item = (&Moment, Option<&Command>, f64)> {
         let before = std::iter::once(self.before.as_ref());
         let before = before.chain(self.moments.iter().map(|m| Some(&m.command)));
@@ -239,13 +241,13 @@ impl Track {
         self.ticks().filter_map(changed).filter(|(by, _)| by.is_finite())
     }
 
-    /// Mean over the ticks of the function `of` of the command.
+    /// Mean of the function `of` of the command over the ticks.
     fn share(&self, of: impl Fn(&Command) -> f64) -> f64 {
         mean(self.ticks().map(|(m, ..)| of(&m.command)))
     }
 }
 
-/// 1 if |`command`| is at or above `most`, else 0. NaN for NaN.
+/// Saturation of a command: 1 if |`command`| is at or above `most`, else 0. NaN for NaN.
 fn stop(command: f64, most: f64) -> f64 {
     if command.is_nan() { f64::NAN } else { f64::from(u8::from(command.abs() >= most)) }
 }

@@ -1,4 +1,4 @@
-//! Quality measures on signals with closed-form results.
+//! Tests of the quality measures with signals for which the results are known in closed form.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -16,7 +16,7 @@ const LIMITS: Limits = Limits {
     slew_per_s: 20.0,
 };
 
-/// Level flight at the target airspeed, which each test modifies.
+/// A sample of level flight at the target airspeed. Each test changes some of its values.
 fn level(time_s: f64) -> Moment {
     Moment {
         time_s,
@@ -29,7 +29,7 @@ fn level(time_s: f64) -> Moment {
     }
 }
 
-/// `seconds` of flight at 100 Hz with a target of roll and pitch in degrees.
+/// A flight of `seconds` at 100 Hz towards a target roll and pitch (degrees). `moment` gives the sample at each time.
 fn track(seconds: f64, [roll, pitch]: [f64; 2], moment: impl Fn(f64) -> Moment) -> Track {
     let count = (seconds / STEP).round() as usize;
     let target = Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed: 20.0 };
@@ -37,8 +37,8 @@ fn track(seconds: f64, [roll, pitch]: [f64; 2], moment: impl Fn(f64) -> Moment) 
     Track { moments, target, before: None, lost_s: 0.0 }
 }
 
-/// For a first-order approach to a roll of 40° with a time constant of 0.5 s, the integral, the settling times and the overshoot
-/// have closed forms.
+/// The roll approaches 40° as a first-order system with a time constant of 0.5 s. Error integral, settling times and overshoot
+/// then have closed forms.
 #[test]
 fn an_exponential_approach_has_the_integral_and_times_of_its_formula() {
     let tau = 0.5;
@@ -46,9 +46,9 @@ fn an_exponential_approach_has_the_integral_and_times_of_its_formula() {
     let flight =
         track(8.0, [40.0, 0.0], |t| Moment { attitude: [roll(t).to_radians(), 0.0], ..level(t) });
     let q = flight.quality(&LIMITS);
-    // ∫ 40 e^(−t/τ) dt = 40 τ. The trapezoidal rule with steps of 0.01 s is too high by the fraction (dt/τ)²/12
+    // ∫ 40 e^(−t/τ) dt = 40 τ. With steps dt of 0.01 s, the trapezoidal rule exceeds it by the fraction (dt/τ)²/12
     assert!((q.error_integral_deg_s - 20.0).abs() < 20.0 * 4e-5, "{q:?}");
-    // each settling time is that of the last tick outside the band, which is within one tick of τ ln(40/1) or τ ln(20)
+    // the measured settling time is the time of the last sample outside the band, at most one tick before τ ln(40/1) or τ ln(20)
     assert!((q.to_one_deg_s - tau * 40f64.ln()).abs() <= STEP);
     assert!((q.to_five_percent_s - tau * 20f64.ln()).abs() <= STEP);
     assert_eq!(q.overshoot_deg, [0.0, 0.0]);
@@ -70,7 +70,8 @@ fn a_second_order_step_overshoots_as_its_damping_says() {
     });
     let expected = (-std::f64::consts::PI * zeta / damped).exp();
     let q = flight.quality(&LIMITS);
-    // a sample up to half a tick from the peak is low by at most the fraction (ωd dt)²/8 of the overshoot
+    // the sample closest to the peak is at most half a tick dt from it, so it is lower by up to about the fraction (ωn dt)²/8 of
+    // the overshoot
     assert!((q.overshoot_deg[0] / 50.0 - expected).abs() < 3e-4 * expected, "{q:?}");
     assert!((q.overshoot_deg[1] / 20.0 - expected).abs() < 3e-4 * expected, "{q:?}");
 }
@@ -82,7 +83,7 @@ fn an_error_that_only_shrinks_from_the_other_side_is_no_overshoot() {
         ..level(t)
     });
     assert_eq!(flight.quality(&LIMITS).overshoot_deg[1], 0.0);
-    // without a step every excursion is an overshoot
+    // if the target equals the initial attitude, every deviation counts as overshoot
     let still = track(1.0, [0.0, 0.0], |t| Moment { attitude: [0.0, -0.1 * t], ..level(t) });
     assert!((still.quality(&LIMITS).overshoot_deg[1] - 0.1_f64.to_degrees()).abs() < 1e-9);
 }
@@ -97,7 +98,7 @@ fn what_never_stays_takes_the_whole_flight_and_a_lost_one_counts_as_upside_down(
     assert!(lost.lost && !lost.kept && (lost.to_one_deg_s - 5.0).abs() < 1e-9);
 }
 
-/// A sine of amplitude A and frequency f over whole periods travels 4 A f T, and its rate has the mean square
+/// The total variation of a sine of amplitude A and frequency f over whole periods T is 4 A f T. Its rate has the mean square
 /// (2π f A)²/2.
 #[test]
 fn a_sine_of_a_surface_travels_four_amplitudes_a_period() {
@@ -119,7 +120,7 @@ fn a_sine_of_a_surface_travels_four_amplitudes_a_period() {
     assert_eq!([q.surface_saturated, q.saturated.throttle], [0.0; 2]);
 }
 
-/// The change from the last command before a new target is included, if there was such a command.
+/// The travel includes the change from the command before the first sample to the first command, if the former is known.
 #[test]
 fn the_first_change_counts_from_the_command_before() {
     let command = Command { aileron: 0.5, ..Command::IDLE };
@@ -127,11 +128,11 @@ fn the_first_change_counts_from_the_command_before() {
     assert_eq!(flight.quality(&LIMITS).travel.aileron, 0.0);
     let after = Track { before: Some(Command::IDLE), ..flight }.quality(&LIMITS);
     assert_eq!(after.travel.aileron, 0.5);
-    // 0.5 in a tick of 0.01 s is 50 per second
+    // a change of 0.5 in a tick of 0.01 s is 50 per second, more than the limit of 20
     assert!((after.outside_s.slew - STEP).abs() < 1e-9);
 }
 
-/// A load factor of 1 + 2 sin exceeds 2 for a third of each period and never falls below −1.
+/// The load factor 1 + 2 sin is above 2 for a third of each period and never below −1.
 #[test]
 fn seconds_outside_are_those_of_the_sine_above_the_limit() {
     let flight = track(12.0, [0.0; 2], |t| {
@@ -175,7 +176,7 @@ fn every_limit_is_judged_by_its_own_quantity() {
     assert_eq!(outside(&|m| m.alpha = f64::NAN), []);
 }
 
-/// An excess of a twentieth of the limit counts as a transient, a larger one does not.
+/// Load factor and angle of attack may exceed their limits by a twentieth of the limit, but not by more.
 #[test]
 fn a_transient_may_pass_load_factor_and_stall_by_a_twentieth() {
     assert!(LIMITS.kept([-1.04, 2.09], [-5.0, 12.5]));
@@ -205,7 +206,8 @@ fn a_file_that_states_no_stall_has_no_limit_of_it() {
     assert_eq!(limits.load_factor[0], f64::NEG_INFINITY);
 }
 
-/// If attitude is missing at the start of a log, the settling time must be NaN, not zero.
+/// If the attitude is unknown in the whole flight, both settling times must be NaN, not zero. If only its start is unknown, so
+/// is the size of the step, and only the time to 5 % of the step must be NaN.
 #[test]
 fn an_unknown_attitude_has_no_settling_time() {
     let unknown = |t: f64| Moment { attitude: [f64::NAN; 2], ..level(t) };

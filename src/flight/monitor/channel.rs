@@ -1,4 +1,5 @@
-//! The six monitored channels with their names and likely causes of a deviation.
+//! The six channels of the model monitor, with their names and the likely causes of a deviation. The monitor compares measured
+//! specific forces and angular accelerations with those that the model predicts.
 
 use std::fmt;
 
@@ -54,15 +55,15 @@ impl fmt::Display for Channel {
     }
 }
 
-/// A warning that a residual has left its band.
+/// A warning that a channel's residual (measurement minus prediction) has left the band that the model's uncertainty explains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Warning {
-    /// The channel whose residual is largest relative to its band.
+    /// The channel whose residual is largest relative to the half width of its band.
     pub channel: Channel,
-    /// Residual divided by the half width of its band, signed and dimensionless. Beyond −1..1 the residual is outside
-    /// the band.
+    /// Residual divided by the half width of its band, signed and dimensionless. The residual is outside the band if the
+    /// magnitude exceeds 1.
     pub share: f64,
-    /// Whether the residual is correlated with the deflection of the channel's surface.
+    /// Whether the residual is correlated with the deflection of the surface that controls this channel.
     pub follows_surface: bool,
 }
 

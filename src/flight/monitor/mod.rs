@@ -1,13 +1,14 @@
-//! The model monitor compares accelerations measured in flight with the model's predictions.
+//! The model monitor compares accelerations measured in flight with the model's predictions, and warns of deviations.
 //!
-//! For each channel (specific force or angular acceleration) the residual is the measurement minus the prediction at
-//! the measured state and surfaces. The band is two standard deviations of the prediction. This standard deviation
-//! combines those of the model's coefficients (15 % if the model file states none) and those of the measured inputs.
-//! Without incidence vanes it includes the effect of gusts. A channel outside its band for 2 s is reported once. It is
-//! reported again only after its residual has stayed below 0.7 of the band's half width for 5 s. Deviations of several
-//! channels of one plane of motion (longitudinal or lateral) within 20 s are attributed to one cause and reported once.
+//! There are six channels: the specific force along each body axis and the angular acceleration about each. The residual of a
+//! channel is the measurement minus the prediction at the measured state and surfaces. The half width of its band is two
+//! standard deviations of the prediction. This standard deviation combines those of the model's coefficients (15 % if the model
+//! file states none) and those of the measured inputs. Without incidence vanes it includes the effect of gusts. A channel is
+//! reported once its smoothed residual has been outside the band for 2 s. It is reported again only after the residual has
+//! stayed below 0.7 of the half width for 5 s. Deviations of several channels of one plane of motion (longitudinal or lateral)
+//! within 20 s are attributed to one cause and reported once.
 //!
-//! No command depends on the monitor.
+//! The monitor does not influence the commands.
 
 mod channel;
 mod prediction;
@@ -21,22 +22,22 @@ use greylag_link::vehicle::{Faults, Telemetry};
 use greylag_model::GreyBox;
 use greylag_physics::{State, Time};
 
-/// Accepted sample intervals for differencing body rates, s.
+/// Sample intervals over which body rates may be differenced, s.
 const STEPS_S: std::ops::RangeInclusive<f64> = 0.002..=0.05;
-/// Deviations in one plane of motion within this time (s) are attributed to one cause.
+/// Deviations in one plane of motion within this time are attributed to one cause, s.
 const ONE_CAUSE_S: f64 = 20.0;
-/// The monitor does not compare below this fraction of the envelope's smallest airspeed.
+/// The monitor compares only above this fraction of the envelope's smallest airspeed.
 const SLOWEST: f64 = 0.8;
 
 /// Measurement and prediction of one channel: m/s² for specific forces, rad/s² for angular accelerations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Compared {
-    /// Measured value. Specific forces are values at the sample, angular accelerations are means over the preceding
-    /// step.
+    /// Measured value. A specific force is the value at the sample. An angular acceleration is the mean over the step before
+    /// the sample.
     pub measured: f64,
-    /// Value predicted by the model, m/s² or rad/s².
+    /// Value that the model predicts.
     pub predicted: f64,
-    /// Half width of the band about the prediction, two standard deviations, in the same unit.
+    /// Half width of the band about the prediction: two standard deviations.
     pub band: f64,
 }
 
@@ -79,8 +80,9 @@ impl Monitor {
         }
     }
 
-    /// Compares a state with its prediction. Returns a warning for the channel that deviates most, if a deviation is to
-    /// be reported. Differencing restarts after a gap and after an unusable state. The function allocates no memory.
+    /// Compares the accelerations measured in `frame` with the predictions. If deviations are due for a report, returns a
+    /// warning for the channel that deviates most. Nothing is compared at the first state after a gap, nor at an unusable state
+    /// and the first one after it. The function allocates no memory.
     pub fn see(&mut self, frame: &Telemetry) -> Option<Warning> {
         self.compared = [false; 6];
         if frame.faults != Faults::NONE
@@ -101,21 +103,21 @@ impl Monitor {
         self.due(now.time)
     }
 
-    /// Clears residuals and earlier reports, for instance when another pilot takes control.
+    /// Forgets residuals and earlier reports, for instance when another pilot takes control.
     pub fn forget(&mut self) {
         (self.last, self.compared) = (None, [false; 6]);
         self.watches = [Watch::default(); 6];
         self.reported = [None; 2];
     }
 
-    /// Residuals divided by the half widths of their bands (two standard deviations), dimensionless, in the order of
-    /// [`Channel::ALL`]. Beyond −1..1 a residual is outside its band. NaN if the residual is unknown.
+    /// Smoothed residuals divided by the half widths of their bands, in the order of [`Channel::ALL`]. Outside −1..1 a residual
+    /// is outside its band. NaN for a channel that could not be compared at the last state.
     pub fn shares(&self) -> Six {
         std::array::from_fn(|k| if self.compared[k] { self.watches[k].share() } else { f64::NAN })
     }
 
-    /// Measurements and predictions at the last state, in the order of [`Channel::ALL`]; `None` for a channel that
-    /// could not be compared.
+    /// Measurements and predictions at the last state, in the order of [`Channel::ALL`]; `None` for a channel that could not
+    /// be compared there.
     pub fn channels(&self) -> [Option<Compared>; 6] {
         std::array::from_fn(|k| {
             let [measured, predicted] = self.values[k];
@@ -142,7 +144,7 @@ impl Monitor {
             frame.actuators.rudder,
         ];
         for (k, watch) in self.watches.iter_mut().enumerate() {
-            // Differenced rates are means over the step. Specific forces are values at its end.
+            // an angular acceleration from differenced rates is a mean over the step, a specific force is the value at its end
             let expected =
                 if k < 3 { predicted[k] } else { 0.5 * (predicted[k] + before.predicted[k]) };
             let residual = measured[k] - expected;
@@ -189,9 +191,9 @@ mod tests {
         .unwrap()
     }
 
-    /// Warnings of the monitor, with their times (s), in a flight of the model `truth`. `commanded` returns the
-    /// reported surfaces from time, state and trim. `acting` returns the surfaces that act on the aircraft from the
-    /// reported surfaces and the trim.
+    /// Warnings of the monitor, with their times (s), in a simulated flight of the model `truth`. `commanded` computes the
+    /// deflections that telemetry reports from time, state and trim. `acting` computes the deflections that act on the aircraft
+    /// from the reported ones and the trim.
     fn warnings(
         seconds: f64,
         truth: &GreyBox,
@@ -237,7 +239,7 @@ mod tests {
         found
     }
 
-    /// Surfaces of a simple control law that holds level flight and follows a slow doublet in pitch.
+    /// Deflections of a simple control law that holds the wings level and follows a pitch command of alternating sign.
     fn flown(at: f64, state: &State, trim: Controls) -> Controls {
         let wanted = 0.04 + if at % 8.0 < 4.0 { 0.06 } else { -0.06 };
         let elevator = trim.elevator + 0.8 * (state.pitch - wanted) + 0.15 * state.q;
@@ -267,7 +269,7 @@ mod tests {
             assert!(truth.set_coefficient(name, value), "{name}");
             truth
         };
-        // Cm0 from 0.0227 to −0.08 changes the trim pitch, as a shift of the centre of gravity does.
+        // Cm0 changes from 0.0227 to −0.08. This changes the trim, as a shift of the centre of gravity does.
         let found = warnings(30.0, &changed("pitch_linear.Cm0", -0.08), flown, |r, _| r);
         assert!(found.iter().any(|(at, w)| w.channel == Channel::Pitch && *at < 10.0), "{found:?}");
         let found = warnings(30.0, &changed("drag_table.k", 3.0), flown, |r, _| r);

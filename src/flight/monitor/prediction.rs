@@ -1,4 +1,4 @@
-//! Predicted accelerations with their variances.
+//! Accelerations that the model predicts, with their variances. The monitor compares the measured accelerations with them.
 
 use greylag_link::vehicle::Telemetry;
 use greylag_model::GreyBox;
@@ -10,16 +10,16 @@ use greylag_physics::{AirData, Controls, State};
 pub type Six = [f64; 6];
 
 /// Standard deviations of the model's inputs: airspeed (relative), surfaces (rad), throttle (0..1). The values are
-/// typical of a pitot tube and servos of small aircraft. The standard deviations of α and β come with the state.
+/// typical of a pitot tube and servos of small aircraft. Each telemetry frame states the standard deviations of α and β.
 const AIRSPEED_SD: f64 = 0.02;
 const SURFACE_SD: f64 = 0.3 * DEGREE;
 const THROTTLE_SD: f64 = 0.02;
-/// Gust intensity (m/s) and scale length (m) for the rotation of the air, which no sensor measures. σ_p of MIL-F-8785C
-/// is 1.9 σ_w / √(L b).
+/// Gust intensity σ_w (m/s) and scale length L (m), from which the rotation of the air is computed. No sensor measures this
+/// rotation. In MIL-F-8785C its standard deviation is σ_p = 1.9 σ_w / √(L b), with the wing span b.
 const GUSTS_MPS: f64 = 1.5;
 const GUST_SCALE_M: f64 = 533.0;
-/// Largest step of the finite differences in α and β, rad. A step as large as the standard deviation in gusts could
-/// exceed the stall angle, where lift drops.
+/// Largest step of the finite differences in α and β, rad. In gusts, a step of one standard deviation could exceed the
+/// stall angle, where lift drops.
 const INCIDENCE_STEP: f64 = 2.0 * DEGREE;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
@@ -29,11 +29,11 @@ pub struct Predictor {
     model: GreyBox,
     /// Prior standard deviation of each coefficient.
     widths: Vec<f64>,
-    /// Standard deviation of the rotation of the air, rad/s.
+    /// Standard deviation of the angular velocity of the air, rad/s.
     air_rotation: f64,
 }
 
-/// Inputs of the model at a sample.
+/// Inputs of the model at one telemetry frame.
 #[derive(Clone, Copy, Debug)]
 struct Asked {
     state: State,
@@ -41,15 +41,15 @@ struct Asked {
     altitude: f64,
 }
 
-/// Adds its step to one uncertain input of the model.
+/// A function that adds a step of about one standard deviation to one input of the model.
 type Change = fn(&mut Asked, &Deviations);
 
-/// Steps of the inputs whose standard deviations depend on the aircraft or on the sample.
+/// Steps of the inputs whose standard deviations depend on the aircraft or on the telemetry frame.
 #[derive(Clone, Copy, Debug)]
 struct Deviations {
     /// α and β, rad: their standard deviations, at most `INCIDENCE_STEP`.
     incidence: [f64; 2],
-    /// Rotation of the air, rad/s.
+    /// Angular velocity of the air, rad/s.
     air_rotation: f64,
 }
 
@@ -75,7 +75,7 @@ impl Predictor {
         Predictor { model, widths, air_rotation }
     }
 
-    /// The predicted accelerations at `frame`, m/s² and rad/s².
+    /// The accelerations predicted for the state and controls of `frame`, m/s² and rad/s².
     pub fn mean(&self, frame: &Telemetry) -> Six {
         self.accelerations(&Asked::at(frame))
     }

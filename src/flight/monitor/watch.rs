@@ -1,22 +1,24 @@
-//! Monitor of one channel: size of its residual relative to the band, and duration outside the band.
+//! Monitor of one channel, a component of specific force or angular acceleration. The residual is the measurement minus the
+//! model's prediction. The band is two standard deviations of the prediction to either side of zero. The monitor reports a
+//! residual that stays outside the band.
 
 /// Time constant of the low-pass filter of the residual, s. The filter attenuates the noise of differenced gyro
 /// signals.
 const SMOOTHED_S: f64 = 0.1;
-/// Averaging time of the root mean squares of residual and band, s. An oscillating residual then counts like a constant
-/// residual of the same root mean square.
+/// Averaging time of the square of the residual and of the variance of the prediction, s. An oscillating residual therefore
+/// counts like a constant residual with the same root mean square.
 const EFFECTIVE_S: f64 = 0.5;
 /// Averaging time of the correlation between surface deflection and residual, s.
 const COMPARED_S: f64 = 3.0;
-/// Half width of the band in standard deviations.
+/// Half width of the band in standard deviations of the prediction.
 const BAND: f64 = 2.0;
-/// Time outside the band after which a deviation is reported, s.
+/// Time (s) outside the band after which the residual is reported as a deviation.
 const OUTSIDE_S: f64 = 2.0;
-/// Condition for a further report: the residual stays below this fraction of the band for this time, s.
+/// Condition for a further report: the residual must first stay below `QUIET` times the half width of the band for `QUIET_S`, s.
 const QUIET: f64 = 0.7;
 const QUIET_S: f64 = 5.0;
-/// Magnitude of the correlation above which a residual follows its surface, and the smallest standard deviation of the
-/// deflection for this test, rad.
+/// Smallest magnitude of the correlation at which a residual counts as caused by the channel's surface. `MOVES` is the smallest
+/// standard deviation of the surface deflection for this test, rad.
 const FOLLOWS: f64 = 0.8;
 const MOVES: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
@@ -42,8 +44,8 @@ struct Follows {
 }
 
 impl Watch {
-    /// Updates the monitor with the residual of a step of `dt` (s). `variance` is the variance of the prediction in the
-    /// square of the residual's unit. `surface` is the deflection (rad) of the channel's surface.
+    /// Updates the monitor with the residual of a step of length `dt` (s). `variance` is the variance of the prediction in the
+    /// square of the residual's unit. `surface` is the deflection (rad) of the surface that acts on the channel; 0 if none does.
     pub fn see(&mut self, residual: f64, variance: f64, surface: f64, dt: f64) {
         let towards = |from: &mut f64, to: f64, time: f64| *from += (to - *from) * dt / (time + dt);
         towards(&mut self.residual, residual, SMOOTHED_S);
@@ -56,8 +58,8 @@ impl Watch {
         self.departed &= self.quiet_s < QUIET_S;
     }
 
-    /// The residual divided by the half width of its band, signed and dimensionless. Beyond −1..1 the residual is
-    /// outside the band. NaN before the first residual.
+    /// The averaged residual (root mean square) divided by the half width of the band, with the sign of the filtered residual.
+    /// A magnitude above 1 is outside the band. NaN before the first residual.
     pub fn share(&self) -> f64 {
         (self.power.sqrt() / self.band()).copysign(self.residual)
     }
@@ -77,7 +79,7 @@ impl Watch {
         self.departed = true;
     }
 
-    /// Whether the residual is correlated with its surface.
+    /// Whether the residual is correlated with the deflection of the channel's surface.
     pub fn follows_surface(&self) -> bool {
         self.follows.correlation().is_some_and(|c| c.abs() >= FOLLOWS)
     }
@@ -85,7 +87,7 @@ impl Watch {
 
 impl Follows {
     fn see(&mut self, surface: f64, residual: f64, dt: f64) {
-        // a plain mean until `COMPARED_S` has passed, so that the first sample has no extra weight
+        // until `COMPARED_S` has passed, all samples have equal weight; later the mean is exponential
         self.seen_s += dt;
         let weight = dt / self.seen_s.min(COMPARED_S);
         let towards = |from: &mut f64, to: f64| *from += (to - *from) * weight;
@@ -96,7 +98,7 @@ impl Follows {
         towards(&mut self.product, surface * residual);
     }
 
-    /// The correlation; `None` while the surface hardly moves or the residual is constant.
+    /// The correlation between deflection and residual; `None` while the surface hardly moves or the residual is constant.
     fn correlation(&self) -> Option<f64> {
         let spread = |k: usize| (self.square[k] - self.mean[k].powi(2)).max(0.0).sqrt();
         let moves = spread(0) >= MOVES && spread(1) > 0.0;
@@ -111,8 +113,8 @@ mod tests {
 
     const DT: f64 = 0.01;
 
-    /// Times of the reported deviations, s, for a residual as a function of time. The standard deviation is 1 and the
-    /// band ±2.
+    /// Times (s) at which a deviation is reported in a flight of `seconds`, for the residual as a function of time. The standard
+    /// deviation of the prediction is 1 and the band is therefore ±2.
     fn departures(seconds: f64, residual: impl Fn(f64) -> f64) -> Vec<f64> {
         let (mut watch, mut times) = (Watch::default(), Vec::new());
         for i in 0..(seconds / DT) as usize {
@@ -129,7 +131,7 @@ mod tests {
     #[test]
     fn a_residual_outside_its_band_departs_after_two_seconds_and_once() {
         let times = departures(60.0, |_| 3.0);
-        // The band is two thirds of the step. The filtered residual first rises to the band, then is outside for 2 s.
+        // The residual steps to 3, and the band ends at 2. The filtered residual takes time to pass 2, then stays out for 2 s.
         assert!(times.len() == 1 && (2.2..3.0).contains(&times[0]), "{times:?}");
         assert_eq!(departures(60.0, |_| 1.8), [0.0; 0], "inside");
         let burst = |t: f64| if (10.0..11.0).contains(&t) { 6.0 } else { 0.0 };
@@ -140,7 +142,7 @@ mod tests {
     fn a_residual_that_swings_about_zero_is_outside_all_the_same() {
         let times = departures(20.0, |t| 5.0 * (TAU * 0.5 * t).sin());
         assert_eq!(times.len(), 1, "{times:?}");
-        // Differenced gyro noise, ten times the band and alternating from sample to sample.
+        // noise as of a differenced gyro signal: ten times the half width of the band, of alternating sign
         let noise = |t: f64| if (t / DT).round() as i64 % 2 == 0 { 20.0 } else { -20.0 };
         assert_eq!(departures(20.0, noise), [0.0; 0]);
     }

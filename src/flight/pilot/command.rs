@@ -1,4 +1,5 @@
-//! Selection of the command: planned, fallback, held or level trim.
+//! Selection of the pilot's command at each tick. The command is that of the controller (planned), that of the fallback
+//! controller, the last command (held), or level trim, the command of trimmed flight with level wings.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3};
 
@@ -8,15 +9,15 @@ use greylag_link::autopilot::Severity;
 use greylag_link::vehicle::Axis;
 use greylag_physics::{Command, Time};
 
-/// Factor on the deviations of the deflections from their running mean after an oscillation. The loop gain at the
-/// oscillation frequency falls by the same factor, and the delay margin grows by about its inverse.
+/// After an oscillation, the deviations of the surface commands from their running mean are multiplied by this factor. The
+/// loop gain at the frequency of the oscillation falls to a third, and the delay margin grows about threefold.
 const REDUCED_GAIN: f64 = 1.0 / 3.0;
-/// Time constant of the running mean of the deflections, s. A limit cycle of 1 to 8 Hz averages out. The constant
+/// Time constant of the running mean of the surface commands, s. A limit cycle of 1 to 8 Hz averages out. The constant
 /// deflections of a turn remain.
 const MEAN_S: f64 = 0.5;
 /// Duration of the reduced gain after an oscillation, s.
 const REDUCED_S: f64 = 5.0;
-/// Bank above which the aircraft is upset, and bank below which it has recovered, rad. Near inverted flight, up
+/// Bank above which the aircraft counts as upset, then bank below which it has recovered, rad. Near inverted flight, up
 /// elevator lowers the nose, so the wings are levelled first. No envelope allows a bank of 90°.
 const UPSET: [f64; 2] = [FRAC_PI_2, FRAC_PI_3];
 
@@ -134,7 +135,8 @@ impl Pilot {
         (self.level_command(), Source::Level)
     }
 
-    /// The command while the state is unusable: the last command for a short time, then level trim.
+    /// The command while the state is unusable: the last command for `state_hold_s` seconds, then level trim. If the vehicle is
+    /// lost, it is level trim at once.
     pub(super) fn without_state(&self) -> (Command, Source) {
         let short = self.estimate.usable_within(self.clock, self.config.state_hold_s);
         if short && !self.vehicle_lost {

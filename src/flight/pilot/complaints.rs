@@ -9,8 +9,8 @@ use greylag_physics::Time;
 /// Least time between two warnings of the same kind, s.
 const COMPLAINT_INTERVAL_S: f64 = 5.0;
 
-/// Delay of airspeed and altitude above which a warning is sent, s. After a gap in telemetry, airspeed and altitude
-/// normally arrive within 20 ms.
+/// A warning is sent if airspeed and altitude are late by more than this, s. After a gap in telemetry they normally arrive
+/// within 20 ms.
 const LATE_AIR_S: f64 = 0.5;
 
 /// Time of the last report of each kind. The end of the controller is reported once.

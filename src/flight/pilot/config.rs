@@ -1,7 +1,7 @@
 //! Settings of the pilot: envelope, timeouts, slew limits, and the trim of straight flight.
 //!
 //! "Level trim" stands for [`Trim::straight`] with level wings. At airspeeds for which a throttle between idle and full
-//! suffices, it is level flight. At other airspeeds it is a descent at idle throttle.
+//! suffices, it is level flight. At other airspeeds it is a descent at idle or full throttle.
 
 use super::polarity::Answers;
 use greylag_model::{GreyBox, Trim, TrimError};
@@ -15,9 +15,9 @@ const TRIM_SPACING: f64 = 1.0;
 pub struct Config {
     /// Flight envelope from the airframe file.
     pub envelope: Envelope,
-    /// Timeout of setpoints and stick inputs, s. The pilot then changes to HOLD.
+    /// Time without setpoints or stick inputs after which the pilot changes to HOLD, s.
     pub offboard_loss_s: f64,
-    /// Timeout of fresh states, s. The vehicle link then counts as lost.
+    /// Time without fresh states after which the vehicle link counts as lost, s.
     pub vehicle_loss_s: f64,
     /// Longest gap in usable states during which the last command is held, s.
     pub state_hold_s: f64,
@@ -27,12 +27,13 @@ pub struct Config {
     pub thrust_source: ThrustSource,
     /// Largest bank and pitch at which arming is allowed, degrees.
     pub arm_tilt_max_deg: f64,
-    /// Airspeed above which disarming needs force, m/s.
+    /// Airspeed above which disarming must be forced, m/s.
     pub disarm_airspeed_max_mps: f64,
-    /// Trim of straight flight with level wings ([`Trim::straight`]), by rising airspeed. Rows without level trim are
-    /// glides at idle throttle.
+    /// Trim of straight flight with level wings ([`Trim::straight`]), by rising airspeed. At airspeeds that level flight cannot
+    /// hold, the row is a descent at idle or full throttle.
     pub trim: Vec<TrimPoint>,
-    /// Modelled responses to the surfaces for the polarity check; `None` omits the check.
+    /// Modelled responses to the surfaces, for the check that the surfaces act in the expected direction. `None` omits the
+    /// check.
     pub answers: Option<Answers>,
 }
 
@@ -50,7 +51,7 @@ pub enum ThrustSource {
 pub struct TrimPoint {
     /// True airspeed V_a, m/s.
     pub airspeed_mps: f64,
-    /// Pitch angle, degrees. It equals the angle of attack in level flight and is smaller in a glide.
+    /// Pitch angle, degrees. It equals the angle of attack in level flight and is smaller in a descent.
     pub pitch_deg: f64,
     /// Elevator command as a fraction, −1..1.
     pub elevator: f64,
@@ -63,8 +64,8 @@ impl Config {
     ///
     /// # Errors
     ///
-    /// If the model has no trim at the cruise airspeed, level or in a glide, or if [`Config::check`] finds an invalid
-    /// setting.
+    /// If the model has no trim at the cruise airspeed, neither level nor in a descent, or if [`Config::check`] finds an
+    /// invalid setting.
     pub fn for_model(model: &GreyBox) -> Result<Self, ConfigError> {
         let envelope = model.airframe.envelope;
         let row = |airspeed: f64| trim_row(model, airspeed);
@@ -92,7 +93,7 @@ impl Config {
             throttle_slew_per_s: 5.0,
             thrust_source: ThrustSource::Cruise,
             arm_tilt_max_deg: 60.0,
-            // Below the flying speed of every fixed-wing aircraft of this class.
+            // Small fixed-wing aircraft fly faster than this.
             disarm_airspeed_max_mps: 8.0,
             trim,
             answers: None,
@@ -141,7 +142,7 @@ pub enum ConfigError {
         "pilot table `trim` needs at least one row, finite numbers, and rising airspeeds: correct the rows"
     )]
     Trim,
-    /// The model has no trim at the cruise airspeed, level or in a glide.
+    /// The model has no trim at the cruise airspeed, neither level nor in a descent.
     #[error("the pilot needs level trim at the cruise airspeed: {0}")]
     NoTrim(#[from] TrimError),
 }
@@ -265,7 +266,7 @@ mod tests {
     #[test]
     fn trim_is_that_of_the_simulator() {
         let full = model().airframe.actuators.elevator.travel.most;
-        // Three rows measured in JSBSim. The tolerance of 0.05° is half of the table's interpolation error.
+        // Three rows measured in JSBSim. The tolerance of 0.05° is half of the table's largest interpolation error.
         for (airspeed, pitch, deflection, throttle) in [
             (16.67, 2.283, 0.01855, 0.118),
             (20.0, 0.858, 0.0688, 0.185),

@@ -1,4 +1,5 @@
-//! Requests to a planner and decisions for the vehicle.
+//! The pilot's requests to a planner and its decisions for the vehicle. The pilot is the flight logic of the companion; in each
+//! control cycle (tick) it turns a state frame into a command. The planner is the active controller.
 
 use super::Pilot;
 use greylag_control::{Controller, Observation, Overruled, Target};
@@ -6,24 +7,24 @@ use greylag_link::autopilot::Mode;
 use greylag_link::vehicle::{Demand, Fault, Outputs};
 use greylag_physics::{Command, Time};
 
-/// Planning request of a tick.
+/// The request for a command that the planner gets in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Request {
     /// Observation at this tick.
     pub observation: Observation,
     /// Target, already limited to the envelope.
     pub target: Target,
-    /// The controller's last command, if the envelope limiter changed it; otherwise `None`.
+    /// The planner's last command, if the envelope limiter changed it; otherwise `None`.
     pub overruled: Option<Overruled>,
-    /// Whether the planner is being engaged and must reset its internal state.
+    /// Whether the planner starts to fly with this request and must reset its internal state.
     pub engage: bool,
 }
 
-/// Seed of a controller's random numbers, the same at every engagement.
+/// Seed of a controller's random numbers. It is the same whenever a controller starts to fly.
 const SEED: u64 = 0;
 
 impl Request {
-    /// The command of `controller` for this request. On engagement the controller is reset first.
+    /// Returns the command of `controller` for this request. If `engage` is set, the controller is reset first.
     pub fn ask(&self, controller: &mut dyn Controller) -> Command {
         if self.engage {
             controller.reset(SEED);
@@ -38,13 +39,13 @@ impl Request {
 /// Outcome of a planning request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Plan {
-    /// The planner's command arrived in time. It need not be finite or in range.
+    /// The planner's command arrived in time. It may be out of range or not finite.
     Ready(Command),
     /// The planner's command did not arrive in time.
     Late,
     /// The planner was still busy with an earlier request and did not receive this one.
     Busy,
-    /// No planner is active.
+    /// There is no planner, or it has ended.
     None,
 }
 
@@ -55,15 +56,15 @@ pub enum Source {
     Planned,
     /// The fallback controller's command, because the plan was late or the planner was busy.
     Late,
-    /// The fallback controller's command, because no planner is active or its command was not finite.
+    /// The fallback controller's command, because there is no planner or its command was not finite.
     Fallback,
-    /// The last command, held over a short gap in usable states.
+    /// The last command, held because the state has been unusable for a short time.
     Held,
-    /// Level trim, because the state is unusable or the fallback's command is not finite.
+    /// Level trim, because the state has been unusable for longer or the fallback's command is not finite.
     Level,
-    /// The pilot's stick positions as surface and throttle commands.
+    /// The stick positions of the human pilot as surface and throttle commands.
     Sticks,
-    /// Level trim with the small pulses of the polarity check.
+    /// Level trim with small surface pulses, by which the polarity check tests the direction in which the surfaces act.
     Check,
     /// Disarmed: all outputs are zero.
     Disarmed,
@@ -88,7 +89,7 @@ impl Source {
 /// The pilot's decision of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decision {
-    /// Vehicle time of the state frame to which the decision responds.
+    /// Vehicle time of the state frame for which the decision was made.
     pub time: Time,
     /// Actuator command, finite and in range. While armed, it differs from the last command by at most the slew limit.
     /// While disarmed, it is [`Command::IDLE`].
@@ -97,19 +98,21 @@ pub struct Decision {
     pub source: Source,
     /// Whether the actuator outputs are enabled.
     pub armed: bool,
-    /// The active mode.
+    /// The active flight mode of the pilot.
     pub mode: Mode,
-    /// The target after envelope limits. Roll and pitch are NaN in stick control and while disarmed.
+    /// The target after the envelope limits. Roll and pitch are NaN in stick control and while disarmed.
     pub target: Target,
     /// Whether a failsafe is active.
     pub failsafe: bool,
-    /// Fault found by the polarity check or the oscillation guard since arming; `None` without a fault.
+    /// Fault that has been found since arming by the polarity check or by the oscillation guard, which detects limit cycles;
+    /// `None` without a fault.
     pub refused: Option<Fault>,
 }
 
 impl Decision {
-    /// The demand on the vehicle. A fault returns control to a real flight controller, which has its own sensors. Such
-    /// faults are an unusable state, an active failsafe, and a finding of the polarity check or the oscillation guard.
+    /// The outputs for the vehicle, with a fault if a real flight controller should take control back: it has sensors of its
+    /// own. While armed, there is a fault if the state is unusable, a failsafe is active, or the polarity check or the
+    /// oscillation guard has found one.
     pub fn demand(&self) -> Demand {
         let fault = match (self.source, self.failsafe) {
             (Source::Level, _) => Some(Fault::State),
@@ -126,7 +129,7 @@ impl Decision {
 }
 
 impl Pilot {
-    /// The decision of this tick.
+    /// Returns the decision of this tick.
     pub(super) fn decision(&self) -> Decision {
         Decision {
             time: self.answering,

@@ -1,4 +1,5 @@
-//! Envelope limiter for the commands of the controller, the fallback and a flight-test schedule.
+//! The pilot's use of the envelope limiter. It limits the surface commands of the controller, of the fallback controller and
+//! of a flight-test schedule.
 
 use super::{Pilot, due};
 use greylag_control::Observation;
@@ -7,9 +8,9 @@ use greylag_link::autopilot::Severity;
 use greylag_physics::Command;
 
 impl Pilot {
-    /// Limits commands to the envelope with the predictions of `limiter`. Stick inputs, held commands and level trim
-    /// are not limited. While attitudes are commanded to a flight controller, only that controller's own protection
-    /// applies.
+    /// Limits commands to the envelope with `limiter` from now on. Stick inputs, held commands, the level trim, and the aileron
+    /// that brings an upset aircraft back to wings level are not limited. If the companion commands attitudes to a flight
+    /// controller, only that controller's own protection applies.
     pub fn protect_with(&mut self, mut limiter: EnvelopeLimiter) {
         limiter.keep_to(&self.config.envelope);
         self.envelope = Some(limiter);
@@ -20,8 +21,8 @@ impl Pilot {
         self.envelope.as_ref()
     }
 
-    /// The command nearest to `command` inside the envelope; `command` without a limiter or while attitudes are
-    /// commanded.
+    /// The command nearest to `command` inside the envelope. Without a limiter, or if attitudes are commanded, it is `command`
+    /// itself.
     pub(super) fn inside_envelope(&mut self, command: Command, seen: &Observation) -> Command {
         let Some(limiter) = self.envelope.as_mut().filter(|_| !self.by_attitude) else {
             return command;

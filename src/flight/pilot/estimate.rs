@@ -1,4 +1,5 @@
-//! The newest usable state with its age.
+//! The newest usable state of the vehicle, and its age. A state is fresh if it differs from the state before it. "Vehicle
+//! time" is the time by the vehicle's clock.
 
 use std::time::Duration;
 
@@ -10,7 +11,7 @@ use greylag_physics::Time;
 /// or two cycles only.
 pub(super) const RESTART: Duration = Duration::from_secs(1);
 
-/// Usability of a frame.
+/// Usability of a telemetry frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Frame {
     /// A new, usable state.
@@ -60,7 +61,7 @@ impl Estimate {
         self.newest.is_some_and(|newest| newest.since(frame.time) > RESTART)
     }
 
-    /// Counts an unchanged state as fresh at `now`. To be called if there is a reason for which it is constant.
+    /// Counts an unchanged state as fresh at `now`. The caller knows a reason why the state is constant.
     pub(super) fn refresh(&mut self, now: Time) {
         if self.usable_at.is_some() {
             self.fresh_at = Some(now);

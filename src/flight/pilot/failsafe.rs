@@ -1,4 +1,5 @@
-//! Detects loss and recovery of the vehicle link, loss of setpoints and sticks, and restarts of the vehicle's clock.
+//! Failsafes of the pilot, the part of the companion that decides on each command. They act on the loss and the recovery of the
+//! link to the vehicle, on the loss of a client's setpoints or stick inputs, and on a restart of the vehicle.
 
 use std::time::Duration;
 
@@ -8,22 +9,23 @@ use super::{Complaints, Pilot};
 use greylag_link::autopilot::{Mode, Severity};
 use greylag_physics::Time;
 
-/// Largest change of a command that may leave the state unchanged, as a fraction of full deflection. A larger change
-/// must be visible in the rates: an aileron change of 0.005 rolls the X8 at 0.85 °/s (Clδa δa / Clp · 2V/b), above the
-/// resolution of any gyro.
+/// Largest change of a command, as a fraction of full deflection, after which the measured state may still be constant. A larger
+/// change must appear in the body rates: an aileron change of 0.005 rolls the X8 at 0.85 °/s (Clδa δa / |Clp| · 2V/b), which is
+/// above the resolution of any gyro.
 const UNFELT_TRAVEL: f64 = 0.005;
 
-/// Time after which constant sensor values under changing commands count as frozen, s. In this time an aircraft at its
-/// largest roll rate rolls by 20°. Real sensors do not repeat bit by bit.
+/// Time (s) for which the measured state may be constant although the commands change. Then the link counts as lost, because
+/// consecutive values of real sensors are not equal bit by bit. An aircraft with a roll rate of 100 °/s rolls by 20° in this
+/// time.
 const FROZEN_LOSS_S: f64 = 0.2;
 
-/// Time for which a recovered vehicle link must persist before the recovery is reported, s. It equals the default
-/// timeout of the vehicle link.
+/// Time (s) for which the link to the vehicle must have been back before its recovery is reported. It equals the default
+/// time after which the link counts as lost.
 const STEADY_S: f64 = 0.5;
 
 impl Pilot {
-    /// Accepts constant sensor values while no command changes. The vehicle may wait for its launch, or a simulator
-    /// without noise may have settled.
+    /// Counts a frame that repeats the previous state bit by bit as fresh while the aircraft is disarmed or no command changes.
+    /// The vehicle may then wait for its launch, or a simulation without noise may have settled.
     pub(super) fn excuse_stillness(&mut self, quality: Frame, now: Time) {
         let (was, is) = (self.last_moved, self.in_force);
         let moves =
@@ -37,7 +39,7 @@ impl Pilot {
         }
     }
 
-    /// Whether the state is fresh; `None` before the first fresh state.
+    /// Whether a fresh state has arrived within the timeout of the vehicle link; `None` before the first fresh state.
     pub(super) fn state_fresh(&self) -> Option<bool> {
         let limit = match self.estimate.is_frozen() {
             true => self.config.vehicle_loss_s.min(FROZEN_LOSS_S),
@@ -46,8 +48,8 @@ impl Pilot {
         self.estimate.fresh_within(self.clock, limit)
     }
 
-    /// Excludes `missed`, the length of a stall of this computer, from the ages of state, setpoints and sticks. The
-    /// next state is treated as if there had been no stall.
+    /// Excludes a stall of this computer of length `missed` from the ages of state, setpoints and sticks. A stall therefore
+    /// does not count as a loss of the link or of a client.
     pub fn excuse(&mut self, missed: Duration) {
         self.estimate.excuse(missed);
         let later = |at: &mut Time| *at = at.plus(missed);
@@ -56,8 +58,8 @@ impl Pilot {
         self.vehicle_back.iter_mut().for_each(later);
     }
 
-    /// Detects the loss of the vehicle, and reports the recovery once it has persisted. An intermittent link counts as
-    /// one loss.
+    /// Detects the loss of the link to the vehicle, and reports its recovery once this has lasted. An intermittent link is
+    /// therefore reported as one loss.
     pub(super) fn watch_vehicle(&mut self) {
         if self.state_fresh() == Some(false) && !self.vehicle_lost {
             self.lose_vehicle();
@@ -110,7 +112,7 @@ impl Pilot {
         }
     }
 
-    /// Resets the pilot after a restart of the vehicle's clock, because earlier states and times are invalid.
+    /// Resets the pilot after the vehicle's clock has jumped back, because earlier states and times are no longer valid.
     pub(super) fn restart(&mut self) {
         if self.estimate.last().is_some() {
             self.texts.say(Severity::Warning, "vehicle clock jumped back: vehicle restarted?");

@@ -1,4 +1,4 @@
-//! Limits of targets (envelope) and of commands (slew rate, airspeed protection).
+//! Limits of the target attitude and airspeed (flight envelope), and of the commands (slew rate, airspeed protection).
 
 use super::config::Config;
 use greylag_control::Target;
@@ -6,7 +6,7 @@ use greylag_physics::Command;
 
 /// Time between two ticks of the control loop, s.
 pub const TICK_S: f64 = 0.01;
-/// Range of airspeed over which pitch protection fades in, m/s.
+/// Within this distance of the minimum or maximum airspeed, the pitch limit moves linearly to its protective value, m/s.
 const PROTECTION_BAND: f64 = 2.0;
 /// Upper pitch limit at the minimum airspeed and below, rad. The nose is then clearly down, but the aircraft does not
 /// dive.
@@ -14,9 +14,9 @@ const RECOVERY_PITCH: f64 = -5.0 * DEGREE;
 /// Lower pitch limit at the maximum airspeed and above, rad. The nose is then clearly up, but the aircraft does not
 /// climb.
 const ARREST_PITCH: f64 = 5.0 * DEGREE;
-/// Load factor available at the minimum airspeed. This airspeed is about 1.41 times the stall speed (13 and 9.2 m/s for
-/// the X8), so the lift allows a load factor of 2. A margin of 1.2 above the stall speed in a turn reduces it to 2 /
-/// 1.2².
+/// Load factor allowed at the minimum airspeed. This airspeed is about √2 times the stall speed in level flight (13 and
+/// 9.2 m/s for the X8), so the aircraft would stall at a load factor of 2. The airspeed must also be at least 1.2 times the
+/// stall speed of the turn, which reduces the load factor to 2 / 1.2².
 const LOAD_AT_MINIMUM: f64 = 2.0 / 1.44;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
@@ -58,8 +58,8 @@ impl From<&Config> for Limits {
 }
 
 impl Limits {
-    /// The bank limit of a level turn at the true airspeed `airspeed` (m/s), rad. The load factor 1/cos φ stays below
-    /// the limit and below the available lift, which grows as V².
+    /// The bank limit of a level turn at the true airspeed `airspeed` (m/s), rad. The load factor 1/cos φ of the turn must exceed
+    /// neither `load_max` nor the load factor that the lift allows, which grows as V².
     pub fn bank_limit(&self, airspeed: f64) -> f64 {
         let lift = LOAD_AT_MINIMUM * (airspeed / self.airspeed_min).powi(2);
         let load = lift.min(self.load_max).max(1.0);
@@ -86,7 +86,7 @@ impl Limits {
         }
     }
 
-    /// The throttle (0..1) after airspeed protection: full below the minimum airspeed, idle above the maximum.
+    /// The throttle (0..1) after airspeed protection: full below the minimum airspeed, idle above the maximum, else unchanged.
     pub fn protect(&self, throttle: f64, airspeed: f64) -> f64 {
         if airspeed < self.airspeed_min {
             1.0
@@ -97,7 +97,7 @@ impl Limits {
         }
     }
 
-    /// `wanted`, limited to its range and to a change of one slew step from `last`. An actuator whose command is NaN
+    /// `wanted`, limited to its range and to the largest change per tick from `last`. An actuator whose command is NaN
     /// keeps its last command, because a NaN would make the clamp of the next tick panic.
     pub fn slew(&self, last: Command, wanted: Command) -> Command {
         let wanted = wanted.clamped();
@@ -135,7 +135,7 @@ mod tests {
 
     #[test]
     fn the_hardest_target_of_the_paper_passes_unchanged_at_the_start_airspeed() {
-        // 60° and 30° at 16.67 m/s: a load factor of 2.0 is needed, 1.389 (16.67 / 13)² = 2.28 is available.
+        // A bank of 60° needs a load factor of 2.0. At 16.67 m/s, 1.389 (16.67 / 13)² = 2.28 is available.
         assert_eq!(x8().limit(wish(60.0, 30.0), 16.67), wish(60.0, 30.0));
     }
 
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn the_load_limit_binds_where_the_bank_limit_is_wide() {
-        // 1 / cos 80° is 5.8. A load factor of 2.2 allows acos(1 / 2.2) = 62.96°.
+        // A bank of 80° has a load factor of 5.8. The limit of 2.2 allows acos(1 / 2.2) = 62.96°.
         let envelope = Limits { bank_max: 80f64.to_radians(), ..x8() };
         assert!((envelope.bank_limit(40.0).to_degrees() - 62.96).abs() < 0.01);
     }
@@ -166,7 +166,7 @@ mod tests {
         let e = x8();
         assert!((e.limit(wish(0.0, 20.0), 12.9).pitch.to_degrees() + 5.0).abs() < 1e-9);
         assert_eq!(e.protect(0.2, 12.9), 1.0);
-        // 2 m/s above the minimum the protection has faded out: pitch is free at 15 m/s.
+        // 2 m/s above the minimum airspeed, at 15 m/s, the full pitch range is allowed.
         assert_eq!(e.limit(wish(0.0, 30.0), 15.0).pitch, 30f64.to_radians());
         assert_eq!(e.protect(0.2, 13.1), 0.2);
     }
@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn full_travel_takes_ten_ticks() {
-        // The travel of 2.0 in 0.1 s is 0.2 per tick.
+        // The surfaces may move through their whole range, 2.0, in 0.1 s: 0.2 per tick.
         let e = x8();
         let mut now = Command { aileron: -1.0, elevator: 1.0, ..Command::IDLE };
         let wanted = Command { aileron: 1e30, elevator: -5.0, throttle: 2.0, rudder: 0.0 };
@@ -191,7 +191,7 @@ mod tests {
         }
         now = e.slew(now, wanted);
         assert!((now.aileron - 1.0).abs() < 1e-9 && (now.elevator + 1.0).abs() < 1e-9);
-        // The throttle takes 20 ticks for full travel: 0.5 after ten.
+        // The throttle takes 20 ticks from 0 to 1, so it is at 0.5 after ten.
         assert!((now.throttle - 0.5).abs() < 1e-9);
     }
 
@@ -211,8 +211,8 @@ mod tests {
         let e = x8();
         let pitch =
             |wanted: f64, airspeed: f64| e.limit(wish(0.0, wanted), airspeed).pitch.to_degrees();
-        // At half and at a quarter of the band, the limit lies between −5° and 30° near the minimum airspeed, and
-        // between 5° and −30° near the maximum.
+        // Airspeeds 1 m/s and 0.5 m/s inside the minimum and the maximum are half and a quarter of the band. The upper limit
+        // is interpolated between −5° and 30°, the lower limit between 5° and −30°.
         for (wanted, airspeed, limited) in [
             (90.0, 14.0, 12.5),
             (90.0, 13.5, 3.75),

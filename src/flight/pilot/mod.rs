@@ -1,4 +1,4 @@
-//! The pilot turns telemetry, time and requests into one command per tick.
+//! The pilot turns telemetry, time and requests into one command per tick (control cycle of 10 ms).
 //!
 //! A tick uses no socket, clock, lock or `Result`. A recording can therefore be replayed: the same calls give the same
 //! commands to the bit. [`Pilot`] describes the order of calls.
@@ -48,7 +48,7 @@ use polarity::Check;
 use programme::Programme;
 use texts::Texts;
 
-/// Time within which a second oscillation counts as persistent, s.
+/// An oscillation counts as persistent if it recurs within this time, s.
 const SWINGS_AGAIN_S: f64 = 20.0;
 
 /// The pilot of one aircraft.
@@ -83,7 +83,7 @@ pub struct Pilot {
     sticks: Option<(Time, Sticks)>,
     setpoint_lost: bool,
     vehicle_lost: bool,
-    /// Whether a loss of the vehicle was reported and its recovery not yet.
+    /// Whether a loss of the vehicle was reported, but not yet its recovery.
     loss_reported: bool,
     /// Vehicle time at which the vehicle link last recovered.
     vehicle_back: Option<Time>,
@@ -115,7 +115,7 @@ pub struct Pilot {
     by_attitude: bool,
     /// Time of the last oscillation. The gain is reduced for a while after an oscillation.
     oscillated: Option<Time>,
-    /// Time of the last update, and low-pass of the controller's commands at that time.
+    /// Time of the last update, and the controller's low-pass filtered commands at that time.
     mean: Option<(Time, Command)>,
     /// Whether the recovery from an upset is active.
     upset: bool,
@@ -216,7 +216,7 @@ impl Pilot {
     }
 
     /// Enables the polarity check of the surfaces at every engagement. Control is returned to the flight controller if
-    /// a sign is wrong or the loop oscillates persistently. It needs the modelled responses in the settings.
+    /// a sign is wrong or the loop oscillates persistently. The check needs the modelled responses in the settings.
     pub fn check_signs(&mut self) {
         self.hands_back = true;
         self.check = self.config.answers.clone().map(Check::new);
@@ -301,8 +301,8 @@ impl Pilot {
         self.decision()
     }
 
-    /// Checks the flown commands for an oscillation and reduces the gain for a while. If an oscillation recurs within
-    /// 20 s and a flight controller can take over, control is returned to the flight controller.
+    /// Reduces the gain for a while if the flown commands oscillate. If the oscillation recurs within 20 s and a flight
+    /// controller can take over, control is returned to the flight controller.
     fn guard(&mut self) {
         let Pending::Fly { seen, .. } = &self.pending else { return };
         if self.by_attitude {

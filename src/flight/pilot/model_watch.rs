@@ -1,5 +1,6 @@
-//! The model monitor and the estimator of the aircraft in the pilot. Deviations from the model are reported to the
-//! ground stations.
+//! The pilot's model monitor and its estimator of the aircraft's derivatives.
+//!
+//! The monitor compares measured accelerations with the model's predictions. It reports deviations to the ground stations.
 
 use super::Pilot;
 use crate::monitor::Monitor;
@@ -18,8 +19,8 @@ impl Pilot {
         self.estimator = Some(estimator);
     }
 
-    /// Evaluates a state with known surface positions in the model monitor and in the estimator of the aircraft. To be
-    /// called after its command is sent: no command depends on the results.
+    /// Passes a state with known surface positions to the model monitor and the estimator. The caller first sends the command
+    /// for this state, because no command depends on the results.
     pub fn monitor(&mut self, frame: &Telemetry) {
         if !self.armed {
             return self.forget_residuals();
@@ -36,7 +37,8 @@ impl Pilot {
         }
     }
 
-    /// Clears the monitor and interrupts the estimator, for instance when the surfaces do not follow the commands.
+    /// Clears the monitor's residuals and interrupts the estimator, for instance while the companion does not command the
+    /// surfaces.
     pub fn forget_residuals(&mut self) {
         if let Some(monitor) = &mut self.monitor {
             monitor.forget();
@@ -46,8 +48,8 @@ impl Pilot {
         }
     }
 
-    /// Residuals divided by the half widths of their bands, dimensionless, in the order of the monitor's channels; NaN
-    /// if unknown.
+    /// Residuals (measured minus predicted accelerations) in the order of the monitor's channels. Each is divided by two
+    /// standard deviations of its prediction; NaN if unknown.
     pub fn residual_shares(&self) -> [f64; 6] {
         self.monitor.as_ref().map_or([f64::NAN; 6], Monitor::shares)
     }

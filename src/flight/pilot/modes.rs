@@ -1,4 +1,4 @@
-//! Requests of clients to the pilot: arming, modes, setpoints and parameters.
+//! Requests of clients to the pilot (the companion's flight logic): arming, modes, setpoints and parameters.
 
 use super::estimate::within;
 use super::{Pilot, Source, parameters};
@@ -93,7 +93,7 @@ impl Autopilot for Pilot {
         if let Some(check) = &mut self.check {
             check.await_authority();
         }
-        // the state may have been constant before arming: its age counts from now on
+        // before arming the state may have been constant for a while; its age counts from now on
         self.estimate.refresh(now);
         self.texts.say(Severity::Notice, format!("armed, {}", mode_name(self.mode)));
         Verdict::Accepted

@@ -1,12 +1,12 @@
-//! The parameters that clients can read and set, and the settings behind them.
+//! The MAVLink parameters that clients can read and set, and the settings of the pilot that they change.
 
 use super::config::{Config, ThrustSource};
 use greylag_link::autopilot::{Parameter, ParameterValue, Verdict};
 
-/// A parameter with a real value: name, getter and setter.
+/// A parameter with a floating-point value: name, getter and setter.
 type Real = (&'static str, fn(&Config) -> f64, fn(&mut Config, f64));
 
-/// The real parameters in the order of their indices. Names have at most 16 characters.
+/// The floating-point parameters in the order of their indices. Names have at most 16 characters.
 const REALS: [Real; 12] = [
     ("GL_OFFB_LOSS_S", |c| c.offboard_loss_s, |c, x| c.offboard_loss_s = x),
     ("GL_VEH_LOSS_S", |c| c.vehicle_loss_s, |c, x| c.vehicle_loss_s = x),
@@ -144,7 +144,7 @@ mod tests {
         assert!(changed(&config, SYSTEM_ID, ParameterValue::Int(7)).is_err());
         assert!(changed(&config, THRUST_SOURCE, ParameterValue::Real(1.0)).is_err());
         assert!(changed(&config, 999, ParameterValue::Real(1.0)).is_err());
-        // Cruise must stay above the minimum airspeed. Otherwise the airspeed protection would act in HOLD.
+        // The cruise airspeed must exceed the minimum airspeed. Otherwise the airspeed protection would act in HOLD.
         assert!(changed(&config, 5, ParameterValue::Real(12.0)).is_err());
     }
 }

@@ -1,4 +1,7 @@
 //! The pilot during the polarity check, from arming to the verdict.
+//!
+//! The check gives pulses to aileron and elevator and tests whether the aircraft responds in the direction that the model
+//! predicts.
 
 use super::estimate::Frame;
 use super::polarity::Verdict;
@@ -7,8 +10,8 @@ use greylag_link::autopilot::Severity;
 use greylag_physics::{Command, Time};
 
 impl Pilot {
-    /// Passes the state to the polarity check. Returns the action of this tick during the check and after a fault;
-    /// otherwise `None`.
+    /// Passes the state to the polarity check. Returns the action of this tick while the check runs and after it has found a
+    /// fault; otherwise `None`.
     pub(super) fn check_polarity(&mut self, quality: Frame) -> Option<Pending> {
         if self.refused.is_none() && !self.check.as_ref()?.is_open() {
             return None;
@@ -36,13 +39,14 @@ impl Pilot {
         open.then_some(Pending::Check { time: frame.time, airspeed })
     }
 
-    /// The command during the check: level trim, with pulses once control authority is given.
+    /// The command during the check: trim of straight flight, with pulses once the companion has control authority.
     pub(super) fn check_command(&self, time: Time, airspeed: f64) -> Command {
         let pulsed = self.check.as_ref().and_then(|check| check.command(time));
         pulsed.unwrap_or_else(|| self.level_at(airspeed))
     }
 
-    /// Level-trim command at an airspeed, m/s, after airspeed protection of the throttle.
+    /// Command for straight flight with level wings at an airspeed, m/s. The throttle is full below the envelope's smallest
+    /// airspeed and idle above its largest.
     fn level_at(&self, airspeed: f64) -> Command {
         let trim = self.config.trim_at(airspeed);
         let throttle = self.limits.protect(trim.throttle, airspeed);

@@ -1,4 +1,5 @@
-//! The flight-test schedule, if one is flown in OFFBOARD.
+//! A flight-test schedule that the pilot flies in OFFBOARD mode instead of a client's setpoints. It is a sequence of targets
+//! (attitudes and airspeeds) and of excitations, which are signals added to a target or a command.
 
 use super::texts::Texts;
 use greylag_control::Target;
@@ -14,8 +15,8 @@ enum Stage {
     Over,
 }
 
-/// A schedule under the pilot. It supplies targets as a client does and adds its excitation to the command. Envelope,
-/// slew limits, airspeed protection and failsafes apply afterwards.
+/// A schedule and its progress. The limits of envelope and slew rate, the airspeed protection and the failsafes apply to its
+/// targets and commands too.
 #[derive(Debug)]
 pub(super) struct Programme {
     name: String,
@@ -25,7 +26,7 @@ pub(super) struct Programme {
 }
 
 impl Programme {
-    /// A programme of `schedule` that has not started.
+    /// Prepares `schedule`, which has not started.
     pub(super) fn new(schedule: Schedule) -> Programme {
         let name = schedule.name.clone();
         Programme { name, overlay: Overlay::new(schedule), demand: None, stage: Stage::Waiting }
@@ -37,7 +38,7 @@ impl Programme {
         (self.demand, self.stage) = (None, Stage::Waiting);
     }
 
-    /// The target at `now`. The first call starts the schedule.
+    /// Returns the target at `now`. The first call starts the schedule.
     pub(super) fn wish(&mut self, now: Time, texts: &mut Texts) -> Target {
         let demand = self.overlay.demand(now);
         let over = self.overlay.is_over(now);
@@ -50,8 +51,8 @@ impl Programme {
         demand.target
     }
 
-    /// Adds the excitation of the schedule to the command `own`. Returns `own` unchanged if no target was requested
-    /// since the last call.
+    /// Adds the schedule's excitation to the command `own`. Returns `own` unchanged if `wish` was not called since the last
+    /// call.
     pub(super) fn excite(&mut self, own: Command) -> Command {
         match self.demand.take() {
             Some(demand) => self.overlay.command(&demand, own),

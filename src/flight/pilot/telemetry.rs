@@ -1,9 +1,10 @@
-//! Checks whether a state frame is usable.
+//! Checks whether a state frame (one message of telemetry from the vehicle) can be used for control.
 
 use greylag_link::vehicle::limits;
 use greylag_link::vehicle::{Faults, Telemetry};
 
-/// Faults that make a state unusable for control. Control does not use the specific force.
+/// Faults that make a frame unusable for control, with their names. A fault of the specific force is not among them, because
+/// control does not use the specific force.
 const STATE_FAULTS: [(Faults, &str); 6] = [
     (Faults::ATTITUDE, "attitude"),
     (Faults::RATES, "body rates"),
@@ -13,10 +14,10 @@ const STATE_FAULTS: [(Faults, &str); 6] = [
     (Faults::ACTUATORS, "actuators"),
 ];
 
-/// Temporary reason: after a gap in telemetry the first airspeed arrives later.
+/// Name of a temporary fault: after a gap in telemetry, airspeed and altitude arrive later than the rest of the state.
 pub(super) const LATE_AIR: &str = "airspeed and altitude are late";
 
-/// Reason for which a frame is unusable: a fault found by the link, or a value that is not finite or implausible.
+/// The quantity that makes `frame` unusable: one with a fault that the link found, or one that is not finite or not plausible.
 /// `None` for a usable frame.
 pub(super) fn defect(frame: &Telemetry) -> Option<&'static str> {
     let found = STATE_FAULTS.iter().find(|(fault, _)| frame.faults.contains(*fault));
@@ -26,7 +27,7 @@ pub(super) fn defect(frame: &Telemetry) -> Option<&'static str> {
 fn implausible(frame: &Telemetry) -> Option<&'static str> {
     let (s, z) = (&frame.state, &frame.actuators);
     let actuators = [z.aileron, z.aileron_rate, z.elevator, z.elevator_rate, z.throttle];
-    // Comparisons with NaN are false: values that are not finite are refused as well.
+    // comparisons with NaN are false, so NaN is refused as well
     if !(s.roll.abs() <= HALF_TURN && s.pitch.abs() <= HALF_TURN / 2.0) {
         Some("attitude")
     } else if !limits::rates([s.p, s.q, s.r]) {
@@ -42,7 +43,8 @@ fn implausible(frame: &Telemetry) -> Option<&'static str> {
     }
 }
 
-/// Whether every sensor value equals that of `earlier` bit by bit, which indicates a frozen sensor.
+/// Whether state, altitude and specific force of `frame` equal those of `earlier` bit by bit. Sensors that work have noise, so
+/// equal values indicate that they are frozen.
 pub(super) fn repeats(frame: &Telemetry, earlier: &Telemetry) -> bool {
     let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
     same(&frame.state.to_array(), &earlier.state.to_array())
@@ -50,7 +52,7 @@ pub(super) fn repeats(frame: &Telemetry, earlier: &Telemetry) -> bool {
         && same(&frame.specific_force, &earlier.specific_force)
 }
 
-/// π plus the rounding of a 32-bit quaternion, rad.
+/// Largest magnitude of the roll angle, rad: π plus a margin for the rounding of a 32-bit quaternion.
 const HALF_TURN: f64 = std::f64::consts::PI + 1e-3;
 
 #[cfg(test)]
@@ -121,7 +123,7 @@ mod tests {
 
     #[test]
     fn the_edge_of_the_plausible_is_still_flown() {
-        // inverted in a spin near a gyroscope's full scale: plausible, and a usable state is then essential
+        // an inverted spin at a roll rate just below the full scale of gyroscopes (35 rad/s)
         let mut frame = good();
         frame.state.roll = -std::f64::consts::PI;
         frame.state.p = 34.9;

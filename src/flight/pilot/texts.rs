@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use greylag_link::autopilot::{Severity, Text};
 
-/// Capacity in texts. It bounds the memory if nobody fetches the texts.
+/// Largest number of texts in the queue. It bounds the memory if nobody fetches the texts.
 const CAPACITY: usize = 32;
 
 /// A queue of texts. When it is full, the oldest of the least severe texts is dropped.

@@ -1,15 +1,18 @@
-//! The target of a tick before envelope limits: from the schedule, from the mode, or level.
+//! The target of a tick (roll, pitch and airspeed to be flown) before the envelope limits it. It comes from the flight-test
+//! schedule or from a client's setpoint or sticks, else it is level flight.
 
 use super::{Pilot, ThrustSource, due};
 use greylag_control::Target;
 use greylag_link::autopilot::{Mode, Severity};
 use greylag_physics::Time;
 
-/// Smallest reduction of a commanded angle by the envelope that is reported, rad.
+/// Difference (rad) between the commanded angle and the angle within the envelope above which the limitation is reported.
 const REPORTED_CUT: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
 impl Pilot {
-    /// The target of the schedule, if one is active at `now`. The throttle is left to the controller.
+    /// The target of the flight-test schedule at `now`, without a throttle: the controller sets the throttle. `None` if there is
+    /// no schedule, or if the mode is not OFFBOARD or no client has sent a setpoint. In these cases the schedule returns to its
+    /// start.
     pub(super) fn scheduled_wish(&mut self, now: Time) -> Option<(Target, Option<f64>)> {
         let programme = self.programme.as_mut()?;
         if self.mode == Mode::Offboard && self.setpoint.is_some() {
@@ -19,7 +22,7 @@ impl Pilot {
         None
     }
 
-    /// The target of the mode before envelope limits, with the throttle (0..1) if the mode sets it.
+    /// The target of the present mode before envelope limits. The second value is the throttle (0..1) if the client sets it.
     pub(super) fn wish(&self) -> (Target, Option<f64>) {
         let airspeed = self.config.envelope.airspeed_cruise_mps;
         match (self.mode, self.setpoint, self.sticks) {
@@ -29,8 +32,7 @@ impl Pilot {
                 (Target { roll: s.roll, pitch: s.pitch, airspeed }, throttle)
             }
             (Mode::Stabilized, _, Some((_, s))) => {
-                // stick forward (positive) lowers the nose; each half of the travel is scaled to the pitch limit in its
-                // direction
+                // a positive value is a stick pushed forward and lowers the nose; full travel is the pitch limit on that side
                 let pitch = if s.pitch > 0.0 {
                     s.pitch * self.limits.pitch_min
                 } else {
@@ -42,7 +44,7 @@ impl Pilot {
         }
     }
 
-    /// Reports that the envelope limits a client's attitude setpoint: once per setpoint, and at most once in 5 s.
+    /// Reports that the envelope limits the attitude setpoint `wish` in OFFBOARD: once per setpoint, and at most once in 5 s.
     pub(super) fn report_limits(&mut self, wish: &Target) {
         let cut = |wanted: f64, flown: f64| (wanted - flown).abs() > REPORTED_CUT;
         let (roll, pitch) = (cut(wish.roll, self.target.roll), cut(wish.pitch, self.target.pitch));

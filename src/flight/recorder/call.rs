@@ -1,5 +1,5 @@
-//! Calls of the pilot as lines of `flight.calls`. Together with the frames of the vehicle they are all inputs of the
-//! pilot.
+//! Calls of the pilot, the part of the companion that selects each command, as lines of the file `flight.calls`. Together
+//! with the recorded messages of the vehicle they are all inputs of the pilot. A flight can therefore be replayed.
 
 use std::fmt;
 use std::str::FromStr;
@@ -25,18 +25,18 @@ pub enum Planned {
     None,
 }
 
-/// One call of the pilot. Its numbers are written so that they read back bit by bit.
+/// One call of the pilot. Its numbers are written with enough digits to be read back without any change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Call {
     /// Vehicle time was advanced to this time.
     Advance(Time),
-    /// This computer had stalled for this time.
+    /// The program had stalled for this time, which does not count for the pilot's timeouts.
     Excuse(Duration),
-    /// The state of this vehicle time was observed. The other fields are the planner's reply and the resulting command.
+    /// The state of this vehicle time was received. The other fields are the planner's reply and the resulting command.
     Tick(Time, Planned, Command),
-    /// Arming was requested at this vehicle time. The flag is set if it was forced.
+    /// Arming was requested at this vehicle time. The flag is set for forced arming.
     Arm(Time, bool),
-    /// Disarming was requested at this vehicle time. The flag is set if it was forced.
+    /// Disarming was requested at this vehicle time. The flag is set for forced disarming.
     Disarm(Time, bool),
     /// The flight controller gave control authority to the companion at this vehicle time.
     Engaged(Time),
@@ -90,7 +90,7 @@ impl fmt::Display for Call {
     }
 }
 
-/// A command as text: aileron, elevator, throttle, and the rudder unless it is zero.
+/// A command as text: aileron, elevator, throttle, and the rudder unless it is +0.
 struct Words<'a>(&'a Command);
 
 impl fmt::Display for Words<'_> {
@@ -101,7 +101,7 @@ impl fmt::Display for Words<'_> {
     }
 }
 
-/// Whether two commands are equal bit by bit; 0 and −0 differ.
+/// Whether two commands are equal bit by bit. +0 and −0 differ.
 pub fn same(a: &Command, b: &Command) -> bool {
     let bits = |c: &Command| [c.aileron, c.elevator, c.throttle, c.rudder].map(f64::to_bits);
     bits(a) == bits(b)
@@ -120,7 +120,7 @@ impl FromStr for Call {
     }
 }
 
-/// The value of a parameter line.
+/// The parameter value of a line that begins with `parameter`; `None` if it is invalid.
 fn parameter(words: &[&str]) -> Option<ParameterValue> {
     match *words.get(2)? {
         "real" => Some(ParameterValue::Real(words.get(3)?.parse().ok()?)),

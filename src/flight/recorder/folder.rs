@@ -13,7 +13,7 @@ pub enum Place {
     Exactly(PathBuf),
 }
 
-/// A recording cannot be started.
+/// Reason why a recording cannot be started.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
     /// The folder exists already.

@@ -1,7 +1,8 @@
-//! The recorder: a thread that writes the files `flight.csv`, `flight.tlog` and `flight.calls`.
+//! The recorder: a thread that writes the files `flight.csv` (a row per tick), `flight.tlog` (MAVLink frames) and
+//! `flight.calls` (calls of the pilot).
 //!
-//! The control thread queues entries and never waits. Entries that do not fit are dropped and counted. An error of the
-//! disk closes the file concerned and is reported once. The flight continues.
+//! The control thread queues entries and never waits. Entries that do not fit are dropped and counted. A disk error closes the
+//! affected file and is reported once. The flight continues.
 
 pub mod call;
 mod folder;
@@ -23,7 +24,7 @@ use queue::Queue;
 
 /// Capacity of the queue in entries: about four seconds of flight at 100 Hz with its link traffic.
 const QUEUE: usize = 4096;
-/// Longest time between the writing of an entry and its flush to the disk.
+/// Longest time for which a written entry stays in the program's buffer before it goes to the file.
 const FLUSH_INTERVAL: Duration = Duration::from_millis(500);
 
 /// An entry of the queue.
@@ -49,9 +50,9 @@ pub struct Written {
     pub rows: u64,
     /// Number of frames in `flight.tlog`.
     pub frames: u64,
-    /// Frames of messages outside the dialect, which are left out of `flight.tlog`.
+    /// Number of frames left out of `flight.tlog`, because this program does not know their message.
     pub unknown: u64,
-    /// Entries dropped because the queue was full or the disk had failed.
+    /// Number of entries and frames dropped because the queue was full or a file had failed.
     pub dropped: u64,
 }
 
@@ -70,11 +71,11 @@ impl Recorder {
             .map_err(|source| RecordError::File { path: folder, source })
     }
 
-    /// A recorder with three given writers instead of files in `folder`.
+    /// A recorder that writes to three given writers. `folder` is only the path that [`Recorder::folder`] returns.
     ///
     /// # Errors
     ///
-    /// If its thread cannot be started.
+    /// If the recorder's thread cannot be started.
     pub fn over(
         folder: PathBuf,
         csv: impl Write + Send + 'static,
@@ -92,13 +93,13 @@ impl Recorder {
         &self.folder
     }
 
-    /// Records a tick as a row.
+    /// Records a tick (control cycle) as a row of `flight.csv`.
     pub fn row(&self, row: Row) {
         self.queue.hand_over(Entry::Row(Box::new(row)));
     }
 
-    /// Records one datagram, or complete frames of a stream, sent or received at `unix_us` (µs since 1970). Frames of
-    /// messages outside the dialect are left out and counted.
+    /// Records one datagram, or complete frames of a stream, sent or received at `unix_us` (µs since 1970). Frames of unknown
+    /// messages are left out and counted.
     pub fn bytes(&self, unix_us: u64, bytes: &[u8]) {
         self.queue.hand_over(Entry::Bytes { unix_us, bytes: bytes.into() });
     }
@@ -108,12 +109,12 @@ impl Recorder {
         self.queue.hand_over(Entry::Call(call));
     }
 
-    /// The oldest error that was not returned yet, as text; `None` without a new error. Each file fails at most once.
+    /// The oldest error that was not returned yet, as text; `None` without a new error. Each file fails once at most.
     pub fn trouble(&self) -> Option<String> {
         self.troubles.try_recv().ok()
     }
 
-    /// Number of entries dropped because the queue was full.
+    /// Number of entries dropped because the queue was full or the recorder's thread had ended.
     pub fn dropped(&self) -> u64 {
         self.queue.dropped()
     }
@@ -223,8 +224,8 @@ impl<C: Write, T: Write, L: Write> Files<C, T, L> {
         }
     }
 
-    /// Flushes the files. A file that fails here loses an unknown number of entries that were counted as written, and
-    /// adds one to the dropped entries.
+    /// Flushes the files. If a file fails here, an unknown number of entries counted as written are lost. The file adds one to
+    /// the dropped entries.
     fn flush(&mut self) {
         let open = self.open();
         self.csv.attempt(Rows::flush);

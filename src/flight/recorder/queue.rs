@@ -1,8 +1,8 @@
-//! A queue to a thread that never blocks the sender. Entries that do not fit are dropped and counted.
+//! A queue to another thread. It never blocks the sender: entries that do not fit are dropped and counted.
 
 use crate::threads::{AtomicU64, Builder, JoinHandle, Ordering, Receiver, Sender, bounded};
 
-/// Sending end of a queue of entries `E`. The receiving thread returns a `W` when the queue is closed.
+/// Sending end of a queue of entries `E`. The receiving thread returns a `W` when it ends.
 #[derive(Debug)]
 pub struct Queue<E, W> {
     entries: Option<Sender<E>>,
@@ -11,8 +11,8 @@ pub struct Queue<E, W> {
 }
 
 impl<E: Send + 'static, W: Default + Send + 'static> Queue<E, W> {
-    /// A queue of `size` entries to a new thread called `name`. The thread runs `work` until the queue is closed and
-    /// empty.
+    /// Starts a thread called `name` that runs `work`, and returns a queue of at most `size` entries to this thread. `work` can
+    /// receive entries until the queue is closed and empty.
     ///
     /// # Errors
     ///

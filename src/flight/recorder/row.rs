@@ -1,4 +1,4 @@
-//! One tick as a row of `flight.csv`.
+//! One tick of the companion's 100 Hz cycle as a row of `flight.csv`.
 
 use std::io::Write;
 
@@ -8,7 +8,7 @@ use greylag_link::vehicle::{Faults, Telemetry};
 use greylag_logs::Sample;
 use greylag_logs::csv::Rows;
 
-/// One tick: state, decision and latency.
+/// The recorded data of one tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
     /// The columns of the log format.
@@ -17,10 +17,10 @@ pub struct Row {
     pub decision: Decision,
     /// Time from the arrival of the state frame to the sending of the command, µs.
     pub latency_us: f64,
-    /// Model residuals divided by the half widths of their bands, as in `Status::residuals`; dimensionless, NaN if
-    /// unknown.
+    /// Residuals of the model monitor (measured minus predicted accelerations), each divided by two standard deviations of the
+    /// prediction, as in `Status::residuals`. NaN if unknown.
     pub residuals: [f64; 6],
-    /// Derivatives of the aircraft estimated in flight, as in `Status::derivatives`; NaN if unknown.
+    /// Stability and control derivatives estimated in flight, as in `Status::derivatives`. NaN if unknown.
     pub derivatives: [f64; ESTIMATES.len()],
 }
 
@@ -45,7 +45,7 @@ impl Row {
         ESTIMATES[3],
     ];
 
-    /// The row of a tick: a state with its decision and latency (µs).
+    /// The row of a tick with this `state`, `decision` and latency (µs), without residuals and derivatives.
     pub fn new(state: &Telemetry, decision: &Decision, latency_us: f64) -> Self {
         Row {
             sample: sample(state, decision),
@@ -56,8 +56,9 @@ impl Row {
         }
     }
 
-    /// Removes the surfaces from the row, for a controller that is commanded attitudes. The companion's surface
-    /// commands were not sent, and the actuator state is unknown. The throttle command was sent and is kept.
+    /// Removes surface commands, deflections and measured throttle from the row. It is called if the companion commands
+    /// attitudes to a flight controller. The companion's surface commands are then not sent, and the actuator state is unknown.
+    /// The throttle command is sent and therefore kept.
     pub fn without_surfaces(mut self) -> Self {
         let sample = &mut self.sample;
         for column in [
@@ -101,13 +102,13 @@ impl Row {
 
 fn sample(state: &Telemetry, decision: &Decision) -> Sample {
     let (s, z, c) = (&state.state, &state.actuators, &decision.command);
-    // a quantity with a fault holds its last valid value, which the log leaves out
+    // a quantity with a fault keeps its last valid value in `state`; it is left out of the row
     let known = |fault: Faults, x: f64| {
         if state.faults.contains(fault) { f64::NAN } else { x }
     };
-    // airspeed and altitude have two fault flags: implausible, and stale
+    // airspeed and altitude have two fault flags: one for implausible values, one for stale values
     let in_air = |x: f64| known(Faults::LATE_AIR, known(Faults::AIR, x));
-    // Without a rudder both values are zero. The rudder columns then stay empty.
+    // without a rudder both values are zero, and the rudder columns stay empty
     let rudder =
         if (z.rudder, c.rudder) == (0.0, 0.0) { [f64::NAN; 2] } else { [z.rudder, c.rudder] };
     Sample {

@@ -1,25 +1,26 @@
-//! Vehicle time between two state frames, extrapolated with the host's monotonic clock.
+//! Vehicle time, the time that the vehicle writes into its state frames. Between two frames it is extrapolated with the
+//! monotonic clock of this computer, the host.
 
 use std::time::{Duration, Instant};
 
 use greylag_physics::Time;
 
-/// Advance of vehicle time between frames.
+/// How vehicle time advances between frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
     /// Real time: between frames, vehicle time advances with the host's clock while the link is polled.
     RealTime,
     /// Lockstep: vehicle time is constant between frames, until the vehicle has been silent for [`PATIENCE`]. The
-    /// result of a flight does not depend on the speed of the machine.
+    /// result of a flight therefore does not depend on the speed of the machine.
     Lockstep,
 }
 
-/// Silence after which a vehicle in lockstep no longer counts as computing. The shim repeats an unanswered frame after
-/// 1 s.
+/// Silence after which a vehicle in lockstep counts as silent and no longer as busy with its computation. It exceeds the 1 s
+/// after which the simulator repeats a frame that was not answered.
 pub const PATIENCE: Duration = Duration::from_millis(1200);
 
-/// Longest part of an interval between two polls that counts as silence of the vehicle. A longer interval is a stall of
-/// the companion, which does not poll the link in that time.
+/// Largest time that the interval between two polls of the link adds to the silence of the vehicle. In a longer interval the
+/// companion has stalled and could not hear the vehicle.
 const LISTENED: Duration = Duration::from_millis(100);
 
 /// Maps host time to vehicle time.
@@ -28,7 +29,7 @@ pub(super) struct Clock {
     pace: Pace,
     /// Time of the newest state.
     anchor: Option<Time>,
-    /// Silence of the vehicle since the anchor, counted while the link was polled, and the time of the last poll.
+    /// Silence of the vehicle since the newest state, as far as the link was polled, and the host time of the last poll.
     listened: (Duration, Option<Instant>),
 }
 
@@ -37,23 +38,23 @@ impl Clock {
         Clock { pace, anchor: None, listened: (Duration::ZERO, None) }
     }
 
-    /// Advance of vehicle time between frames.
+    /// How vehicle time advances between frames.
     pub(super) fn pace(&self) -> Pace {
         self.pace
     }
 
-    /// Sets the anchor: a state of vehicle time `time` arrived at `arrived`.
+    /// Records that a state with the vehicle time `time` arrived at the host time `arrived`.
     pub(super) fn set(&mut self, arrived: Instant, time: Time) {
         self.anchor = Some(time);
         self.listened = (Duration::ZERO, Some(arrived));
     }
 
-    /// Records a poll of the link at `host`.
+    /// Records a poll of the link at the host time `host`.
     pub(super) fn listen(&mut self, host: Instant) {
         self.listened = (self.silence(host), Some(host));
     }
 
-    /// Vehicle time at `host`; zero before the first state.
+    /// Vehicle time at the host time `host`; zero before the first state.
     pub(super) fn at(&self, host: Instant) -> Time {
         let Some(time) = self.anchor else {
             return Time::default();
@@ -64,7 +65,7 @@ impl Clock {
         }
     }
 
-    /// Silence of the vehicle at `host` while the link was polled.
+    /// Silence of the vehicle from the newest state to `host`, as far as the link was polled.
     fn silence(&self, host: Instant) -> Duration {
         let (silence, until) = self.listened;
         let since = until.map_or(Duration::ZERO, |until| host.saturating_duration_since(until));
@@ -97,8 +98,8 @@ mod tests {
         for look in 1..=170 {
             clock.listen(later(10 * look));
         }
-        // Half a second after `PATIENCE`, vehicle time is half a second after the newest state: the link counts as
-        // lost.
+        // 1.7 s of silence are 0.5 s more than `PATIENCE`: vehicle time is 0.5 s after the newest state, and the pilot
+        // counts the link as lost
         assert_eq!(clock.at(later(1700)), time(5500));
         // A stall of five seconds adds only `LISTENED` of silence.
         assert_eq!(clock.at(later(6700)), time(5600));

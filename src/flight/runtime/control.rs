@@ -1,4 +1,4 @@
-//! The control thread: a loop that first responds to state frames and then serves clients.
+//! The control thread: a loop that answers each state frame, a message with the vehicle's state, and then serves clients.
 
 mod clients;
 mod vehicle;
@@ -31,22 +31,22 @@ use greylag_physics::Time;
 const POLL: Duration = Duration::from_millis(10);
 /// Period of the control loop.
 const CYCLE: Duration = Duration::from_millis(10);
-/// If no state has arrived by this time after the start, a missing vehicle is reported.
+/// If no state has arrived by this time after the start, the vehicle is reported as missing.
 const NO_VEHICLE: Duration = Duration::from_secs(2);
-/// Weight of the newest tick in the low-pass of the reported load.
+/// Weight of the newest tick in the load that is reported to clients, an exponential mean over the ticks.
 const LOAD_WEIGHT: f64 = 0.02;
-/// Ids of the autopilot in messages to clients.
+/// MAVLink system and component ids of the autopilot in messages to clients.
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
-/// Largest age of a live state, and longest wait for a live state after a stall. Older states are left over from the
-/// stall.
+/// After a stall, a state of at most this age counts as live. Older states are left over from the stall. It is also the
+/// longest wait for a live state.
 const CATCH_UP: Duration = Duration::from_millis(50);
 /// Longest wait for the network thread to deliver queued packets after a stall.
 const HAND_OVER: Duration = Duration::from_secs(2);
-/// Interval between two readings of the scheduler's counters.
+/// Interval between two readings of the operating system's scheduler counters, which tell the cause of a stall.
 const WAITED: Duration = Duration::from_secs(1);
 
-/// An arrival with its origin.
+/// A received packet with its origin.
 enum Arrived {
     Vehicle(Arrival),
     Client(Arrival),
@@ -58,7 +58,7 @@ pub(super) struct Control {
     planner: Planner,
     vehicle: Vehicle,
     clients: Clients,
-    /// Router between clients and a real flight controller; `None` for the simulator's shim.
+    /// Router between clients and a real flight controller; `None` for the simulator.
     router: Option<Router>,
     ports: Ports,
     recorder: Option<Recorder>,
@@ -140,7 +140,7 @@ impl Control {
             if host >= next_poll {
                 self.poll(host);
                 rounds.fetch_add(1, Ordering::Relaxed);
-                // periods missed in a stall are not made up
+                // after a stall, missed periods are skipped
                 next_poll = (next_poll + POLL).max(host);
             }
         }
@@ -163,7 +163,8 @@ impl Control {
         match arrived {
             Some(Arrived::Vehicle(arrival)) => self.take_vehicles(Some(arrival), resumed),
             Some(Arrived::Client(arrival)) => {
-                // states come first: setpoints are stamped with vehicle time, which did not advance during the stall
+                // The states are handled first, because setpoints are stamped with vehicle time, which did not advance in
+                // the stall.
                 if resumed.is_some() {
                     self.take_vehicles(None, resumed);
                 }
@@ -174,14 +175,14 @@ impl Control {
         }
     }
 
-    /// Detects a stall of this computer, waits until the network thread has delivered the packets of that time, and
-    /// excludes the stall from all timeouts. Returns the vehicle time from which on states are live; `None` without a
+    /// Detects a stall of this program or its network thread, waits until the packets that arrived in it are delivered, and
+    /// excludes its duration from all timeouts. Returns the vehicle time from which on states count as live; `None` without a
     /// stall.
     fn excuse_stall(&mut self) -> Option<Time> {
         let host = Instant::now();
         let (behind, since) = self.attention.look(host, self.ports.rounds())?;
         let before = self.clock.at(since);
-        // the first round may have started before the end of the stall: only the second surely polls every socket
+        // The present round may have begun before the end of the stall. Only the next one is sure to poll every socket.
         let handed_over = self.ports.rounds() + 2;
         while self.ports.rounds() < handed_over && host.elapsed() < HAND_OVER {
             std::thread::sleep(CYCLE / 5);
@@ -207,12 +208,12 @@ impl Control {
         Some(before.plus(missed.saturating_sub(CATCH_UP)))
     }
 
-    /// Reports a condition of a link to the ground stations.
+    /// Sends a remark of the transport about a link to the clients, as a warning.
     fn remark(&mut self, remark: &Remark) {
         self.pilot.send_text(Severity::Warning, &remark.to_string());
     }
 
-    /// Performs the periodic duties at `host`.
+    /// Performs the periodic duties. `host` is the present time of this computer.
     fn poll(&mut self, host: Instant) {
         self.clock.listen(host);
         let now = self.now(host);
@@ -247,7 +248,7 @@ impl Control {
         }
     }
 
-    /// Records a packet received or sent at `host`.
+    /// Records a packet that was received or sent at the time `host` of this computer.
     fn record(&mut self, host: Instant, bytes: &[u8]) {
         if let Some(recorder) = &self.recorder {
             recorder.bytes(self.stamps.of(host), bytes);

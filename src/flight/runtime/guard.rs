@@ -27,7 +27,7 @@ pub enum VehicleLink {
     Open,
 }
 
-/// Signing cannot be set up.
+/// Reason why signing cannot be set up.
 #[derive(Debug, thiserror::Error)]
 pub enum SigningError {
     /// The key is unusable.
@@ -38,7 +38,7 @@ pub enum SigningError {
     Stamp(#[from] StampError),
 }
 
-/// The signer with the numbers of the signed links.
+/// Signs and checks the frames of the links whose ids are in `links`.
 pub(super) struct Guard {
     signer: Signer,
     file: StampFile,
@@ -46,7 +46,8 @@ pub(super) struct Guard {
 }
 
 impl Guard {
-    /// Reads key and timestamp. Link 0 is the vehicle's link. The clients' links are numbered from 1.
+    /// Reads the key and the timestamp. The vehicle's link has id 0. The clients' links have ids from 1, in the order of
+    /// `options`.
     pub(super) fn open(signing: &Signing, options: &FlightOptions) -> Result<Self, SigningError> {
         let key = Key::load(&signing.key)?;
         let (file, stamp) = StampFile::open(&signing.key)?;
@@ -59,8 +60,8 @@ impl Guard {
         Ok(Guard { signer: Signer::new(key, stamp), file, links })
     }
 
-    /// Signs the frames in `bytes`, which are sent on `link` at `unix_us` (µs since 1970). Bytes of unsigned links stay
-    /// unchanged.
+    /// Signs the frames in `bytes`, which are to be sent on `link` at `unix_us` (µs since 1970). If the link is not signed,
+    /// `bytes` is returned unchanged.
     pub(super) fn sign(&mut self, unix_us: u64, link: LinkId, bytes: Vec<u8>) -> Vec<u8> {
         if !self.links.contains(&link) {
             return bytes;
@@ -70,8 +71,8 @@ impl Guard {
         signed
     }
 
-    /// The authenticated frames of `bytes`, which arrived on `link` at `unix_us` (µs since 1970). All bytes of unsigned
-    /// links are returned.
+    /// Returns those frames of `bytes` that have a valid signature. `bytes` arrived on `link` at `unix_us` (µs since 1970). If
+    /// the link is not signed, `bytes` is returned unchanged.
     pub(super) fn believed(&mut self, unix_us: u64, link: LinkId, bytes: Vec<u8>) -> Vec<u8> {
         if !self.links.contains(&link) {
             return bytes;
@@ -81,7 +82,7 @@ impl Guard {
         believed
     }
 
-    /// An error of the timestamp file as text, returned once; `None` without a new error.
+    /// A new error of the timestamp file as text. Each error is returned once; `None` if there is none.
     pub(super) fn trouble(&self) -> Option<String> {
         self.file.trouble()
     }

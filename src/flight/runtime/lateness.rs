@@ -1,31 +1,32 @@
-//! Detection of stalls of the control and network threads, with their cause.
+//! Detection of stalls of the control thread and of the network thread, with their cause. Both threads run in rounds; in each
+//! round they check for new packets (poll). A thread stalls if it does not poll for a long time.
 
 use std::time::{Duration, Instant};
 
-/// Time without a poll after which a thread counts as stalled: ten cycles.
+/// Time without a poll after which a thread counts as stalled: ten cycles of 10 ms.
 const LATE: Duration = Duration::from_millis(100);
-/// Longest interval between two polls of a thread that is not stalled: it polls at least once per cycle.
+/// Longest regular interval between two polls: a thread polls at least once per cycle.
 const USUAL: Duration = Duration::from_millis(10);
-/// Least time between two stall reports.
+/// Shortest time between two stall reports.
 const REPORT_INTERVAL: Duration = Duration::from_secs(5);
-/// If the thread was runnable for at least this fraction of a stall, other load is the cause.
+/// If the thread waited for a processor for at least this fraction of a stall, other load is the cause.
 const BUSY: f64 = 0.5;
 
 /// The thread that stalled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Behind {
-    /// The control thread, and probably the whole program.
+    /// The control thread stalled, and probably the whole program.
     Control,
-    /// The network thread alone, while the control thread ran.
+    /// Only the network thread stalled.
     Network,
 }
 
 /// Stall detector of the control and network threads.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Attention {
-    /// Time of the last check, which is made by the control thread.
+    /// Time of the control thread's last call of [`Attention::look`].
     looked: Instant,
-    /// Rounds of the network thread, and the time of their last increase.
+    /// Number of the network thread's rounds, and the time at which an increase was last seen.
     network: (u64, Instant),
 }
 
@@ -34,8 +35,8 @@ impl Attention {
         Attention { looked: host, network: (0, host) }
     }
 
-    /// Checks both threads at `host`. `rounds` is the number of rounds of the network thread so far. On a stall,
-    /// returns the stalled thread and the time of its last poll.
+    /// Checks both threads at the time `host`. The control thread calls it in every round. `rounds` is the number of the network
+    /// thread's rounds so far. On a stall, returns the stalled thread and the time of its last poll.
     pub(super) fn look(&mut self, host: Instant, rounds: u64) -> Option<(Behind, Instant)> {
         let looked = std::mem::replace(&mut self.looked, host);
         if rounds != self.network.0 {
@@ -49,7 +50,7 @@ impl Attention {
         }
     }
 
-    /// Restarts the detector after a stall, at the time `host` at which both threads poll again.
+    /// Restarts the detector after a stall. `host` is a time at which both threads poll again.
     pub(super) fn resume(&mut self, host: Instant, rounds: u64) {
         *self = Attention { looked: host, network: (rounds, host) };
     }
@@ -63,20 +64,20 @@ pub(super) fn lateness(since: Instant, host: Instant) -> Duration {
 /// Cause of a stall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Cause {
-    /// The thread was runnable, but other work used the processor.
+    /// The thread could have run, but other work used the processor.
     Busy,
-    /// The thread was suspended.
+    /// The thread was stopped, or the machine was suspended.
     Stopped,
     /// The cause is unknown.
     Unknown,
 }
 
-/// Time for which this thread was runnable without running, from the scheduler's counters.
+/// Total time for which this thread has waited for a processor, from the scheduler's counters; `None` if unknown.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Waited(Option<Duration>);
 
 impl Waited {
-    /// Reads the counters. The time is unknown if the system has no such counters.
+    /// The waiting time so far. It is unknown if the system has no such counters.
     pub(super) fn now() -> Self {
         let counted = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
         Waited(
@@ -86,7 +87,7 @@ impl Waited {
         )
     }
 
-    /// Cause of a stall of length `missed`, from the counters before the stall (`self`) and after it (`now`).
+    /// Cause of a stall of length `missed`, from the waiting time before the stall (`self`) and after it (`now`).
     pub(super) fn cause(self, now: Waited, missed: Duration) -> Cause {
         match (self.0, now.0) {
             (Some(before), Some(after)) => {
@@ -98,18 +99,17 @@ impl Waited {
     }
 }
 
-/// Rate limit of stall reports. A stall is reported immediately. The stalls of the next 5 s are summed up in one
-/// report.
+/// Rate limit of stall reports. A first stall is reported immediately. The stalls of the next 5 s are reported together.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Reports {
     /// Time of the last report.
     reported: Option<Instant>,
-    /// Number of stalls since the last report, and the longest of them.
+    /// Number of stalls that are not yet reported, and the length of the longest of them.
     unreported: (u32, Duration),
 }
 
 impl Reports {
-    /// Adds a stall that ended at `host`. Returns the immediate report; `None` if a report was made recently.
+    /// Notes a stall of length `missed` that ended at `host`. Returns its report; `None` if the last report is less than 5 s old.
     pub(super) fn note(&mut self, host: Instant, missed: Duration, cause: Cause) -> Option<String> {
         if self
             .reported
@@ -145,7 +145,7 @@ impl Reports {
     }
 }
 
-/// Text that names other load on the processors, with the load average if the system has it.
+/// Text that names other load on the processors as the cause, with the load average if the system gives one.
 fn busy() -> String {
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
     let load = std::fs::read_to_string("/proc/loadavg").ok();

@@ -1,4 +1,4 @@
-//! The runtime: threads, clocks and channels around the pilot.
+//! The runtime: threads, clocks and channels around the pilot. The pilot decides on the command of each 10 ms cycle (tick).
 //!
 //! ```text
 //! network thread ── vehicle channel ─► control thread ── bounded queue ─► recorder thread
@@ -68,12 +68,13 @@ pub struct FlightOptions {
     pub plan_deadline: Duration,
     /// Travels of the airframe's surfaces.
     pub travels: Travels,
-    /// Surfaces and motors of the airframe, to which the `sitl` profile also sends commands; `None` if the airframe
-    /// does not name them.
+    /// Mixer from the commands to the airframe's individual surfaces and motors, whose commands the simulator also
+    /// receives; `None` if the airframe does not name them.
     pub mixer: Option<Mixer>,
-    /// Profile of a real flight controller; `None` for the simulator's shim.
+    /// Profile of a real flight controller; `None` for the simulator.
     pub controller: Option<Profile>,
-    /// Delay margin of the loop through a real controller's surfaces; `None` if it is unknown.
+    /// Delay margin of the control loop when the companion commands the surfaces through a real flight controller;
+    /// `None` if it is unknown.
     pub delay_margin: Option<Duration>,
     /// Message signing of the links; `None` for unsigned links.
     pub signing: Option<Signing>,
@@ -141,7 +142,7 @@ pub struct Flight {
     pub clients: Vec<Option<SocketAddr>>,
     /// Folder of the recording; `None` without a recording.
     pub recording: Option<std::path::PathBuf>,
-    /// Rounds of the control thread, about one per 10 ms while the thread runs.
+    /// Counter of the control thread's loop iterations, about one per 10 ms.
     pub rounds: Arc<AtomicU64>,
     thread: JoinHandle<Summary>,
 }

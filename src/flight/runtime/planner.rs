@@ -1,4 +1,5 @@
-//! The planner of a tick: a controller in the control loop or on a separate thread.
+//! The planner, which is the controller that the pilot asks for a command in each tick of 10 ms. It runs in the control loop or
+//! on a thread of its own.
 
 mod threaded;
 
@@ -12,12 +13,12 @@ pub(super) use threaded::Threaded;
 pub(super) enum Planner {
     /// A controller that is fast enough for the control loop.
     Inline(Box<dyn Controller>),
-    /// A slow controller on a separate thread. Its plan is used at the tick of its request or not at all.
+    /// A slow controller on a thread of its own. A plan (its command for a tick) is used at the tick of its request or never.
     Threaded(Threaded),
 }
 
 impl Planner {
-    /// The plan for `request`, whose state arrived at `arrived`. The wait ends at the planner's deadline.
+    /// The plan for `request`, whose state arrived at `arrived`. In real time, the wait for a threaded plan ends at its deadline.
     pub(super) fn plan(&mut self, request: &Request, arrived: Instant) -> Plan {
         match self {
             Planner::Inline(controller) => Plan::Ready(request.ask(controller.as_mut())),
@@ -48,8 +49,8 @@ mod tests {
         Request { observation, target, overruled: None, engage }
     }
 
-    /// A controller whose first plans wait for a release. The throttle of its commands counts its engagements and the
-    /// aileron its plans, 0.1 each.
+    /// A controller that can be made to wait in a plan until it is released. In its commands, the throttle is 0.1 per reset and
+    /// the aileron 0.1 per plan, so that a test can count both.
     #[derive(Clone)]
     struct Held {
         begun: Sender<()>,
@@ -87,7 +88,7 @@ mod tests {
     }
 
     impl Bench {
-        /// `waits` holds, for each plan in order, whether the plan waits for a release.
+        /// Starts a planner. `waits` has one entry per plan, in order: whether this plan waits for a release.
         fn new(pace: Pace, waits: &[bool]) -> Bench {
             let ((begun, started), (go, gate)) = (bounded(9), bounded(9));
             let waits = waits.iter().rev().copied().collect();
@@ -96,19 +97,19 @@ mod tests {
             Bench { planner, begun: started, go }
         }
 
-        /// A plan that is ready in time on any machine.
+        /// Requests a plan with a deadline that any machine meets.
         fn in_time(&mut self, engage: bool) -> Plan {
             self.planner.deadline = Duration::from_secs(60);
             self.planner.plan(&any_request(engage), Instant::now())
         }
 
-        /// A plan with a deadline of 5 ms, which a waiting controller misses.
+        /// Requests a plan with a deadline of 5 ms, which a waiting controller misses.
         fn too_late(&mut self, engage: bool) -> Plan {
             self.planner.deadline = Duration::from_millis(5);
             self.planner.plan(&any_request(engage), Instant::now())
         }
 
-        /// Waits until `plans` late plans have arrived.
+        /// Blocks until `plans` late plans have arrived.
         fn done(&self, plans: usize) {
             while self.planner.plans.len() < plans {
                 std::thread::sleep(Duration::from_millis(1));
@@ -135,7 +136,7 @@ mod tests {
         let mut bench = Bench::new(Pace::RealTime, &[true]);
         assert_eq!(bench.too_late(true), Plan::Late);
         bench.begun.recv().unwrap();
-        // This request waits in the queue. The next request finds the queue full.
+        // the controller is still waiting: the next request enters the queue, and the one after it finds the queue full
         assert_eq!(bench.too_late(false), Plan::Late);
         assert_eq!(bench.too_late(true), Plan::Busy);
         bench.go.send(()).unwrap();
@@ -143,7 +144,7 @@ mod tests {
         assert_eq!(bench.in_time(false), ready(0.2, 0.1 + 0.1 + 0.1));
     }
 
-    /// A controller that panics at its first command.
+    /// A controller that panics when it is asked for a command.
     #[derive(Clone)]
     struct Failing;
 

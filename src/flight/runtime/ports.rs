@@ -1,4 +1,4 @@
-//! The links of a flight, with their arrival queues and signatures.
+//! The links of a flight to the vehicle and to the clients, with the queues of arrived packets and with the signing of frames.
 
 use std::net::SocketAddr;
 
@@ -10,12 +10,13 @@ use greylag_link::peer::{LinkId, PeerId};
 use greylag_link::signing::SigningCounts;
 use greylag_link::transport::{Arrival, Link, Network, Packet};
 
-/// Capacity of the vehicle's queue in packets: about 2 s of telemetry, longer than most stalls of the control thread.
+/// Capacity of the vehicle's queue, packets. It holds about 2 s of telemetry, which is longer than most stalls of the control
+/// thread.
 const VEHICLE_QUEUE: usize = 256;
-/// Capacity of the clients' queue. Further packets are dropped.
+/// Capacity of the clients' queue, packets. Further packets are dropped.
 const CLIENT_QUEUE: usize = 512;
 
-/// The open links with the channels of their arrivals.
+/// The open links, and the queues of the packets that arrive on them.
 pub(super) struct Ports {
     vehicle: Link,
     pub(super) clients: Vec<Link>,
@@ -27,7 +28,7 @@ pub(super) struct Ports {
 }
 
 impl Ports {
-    /// Opens all links. After an error none stays open.
+    /// Opens all links. If one cannot be opened, none stays open.
     pub(super) fn open(options: &FlightOptions) -> Result<Self, FlightError> {
         let guard = options.signing.as_ref().map(|s| Guard::open(s, options)).transpose()?;
         let mut network = Network::start()?;
@@ -52,7 +53,7 @@ impl Ports {
         self.clients.iter().map(Link::local).collect()
     }
 
-    /// Number of rounds of the network thread.
+    /// Number of rounds of the network thread. It polls every socket between two rounds.
     pub(super) fn rounds(&self) -> u64 {
         self.network.rounds()
     }
@@ -96,7 +97,7 @@ impl Ports {
         }
     }
 
-    /// An error of the file of the signing timestamp as text, returned once; `None` without a new error.
+    /// Text of a new error of the file that stores the signing timestamp. Each error is returned once.
     pub(super) fn trouble(&self) -> Option<String> {
         self.guard.as_ref().and_then(Guard::trouble)
     }
@@ -140,7 +141,7 @@ mod tests {
         vehicle.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
         let peer = PeerId { link: LinkId(0), address: vehicle.local_addr().unwrap() };
         let source = Source { system: 1, component: 191 };
-        // A MAVLink 1 frame cannot be signed. The first datagram is that of the frame after it.
+        // A MAVLink 1 frame cannot be signed. The first datagram must therefore contain the second frame.
         for version in [Version::V1, Version::V2] {
             let heartbeat = write(version, 0, source, 0, &[0; 9]).unwrap();
             ports.send_to_vehicle(0, peer, heartbeat);

@@ -1,4 +1,4 @@
-//! The pilot's interface for clients, which records each call and reports each text as an event.
+//! The pilot's interface for clients. It records the calls that change the pilot's state and reports each text as an event.
 
 use super::Event;
 use crate::pilot::Pilot;
@@ -9,7 +9,8 @@ use greylag_link::autopilot::{
 use greylag_link::vehicle::Vehicle;
 use greylag_physics::Time;
 
-/// Passes all calls to the pilot. Each text for the ground stations also becomes an event.
+/// Passes calls to the pilot. If control of the vehicle cannot be taken now, arming is refused without a call of the pilot.
+/// Each text for the ground stations also becomes an event.
 pub(super) struct RecordingAutopilot<'a, F: FnMut(Event)> {
     pub(super) pilot: &'a mut Pilot,
     pub(super) vehicle: &'a Vehicle,
@@ -27,7 +28,7 @@ impl<F: FnMut(Event)> RecordingAutopilot<'_, F> {
 
 impl<F: FnMut(Event)> Autopilot for RecordingAutopilot<'_, F> {
     fn arm(&mut self, now: Time, force: bool) -> Verdict {
-        // force skips pre-arm checks only, not the conditions of the flight controller
+        // force skips the pilot's own checks, but arming still needs a vehicle that can be controlled
         match self.vehicle.obstacle() {
             Some(obstacle) => Verdict::Rejected(format!("arming refused: {obstacle}")),
             None => {

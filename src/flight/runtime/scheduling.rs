@@ -1,4 +1,5 @@
-//! Wake-up latency of this computer, and the real-time scheduling class.
+//! Wake-up latency of this computer, and the real-time scheduling class. The wake-up latency is the delay with which a sleeping
+//! thread runs again.
 
 use std::fmt;
 use std::io;
@@ -6,12 +7,12 @@ use std::time::{Duration, Instant};
 
 use super::timing::Histogram;
 
-/// Real-time priority, 1..99: above most threads, below the kernel's interrupt threads, which have 50.
+/// Priority of the companion's threads within SCHED_FIFO (1..99). It is below that of the kernel's interrupt threads (50).
 const PRIORITY: i32 = 40;
 /// Period of the wake-up measurement.
 const CYCLE: Duration = Duration::from_millis(10);
-/// Limits of the wake-up latency. One wake-up in a hundred may exceed the first limit, and none may exceed the second.
-/// A plan has 8 ms in a cycle of 10 ms.
+/// Limits of the wake-up latency. At most one wake-up in a hundred may exceed the first limit, and none may exceed the second.
+/// In a control cycle of 10 ms, 8 ms are for the plan; 2 ms remain.
 const LATE: (Duration, Duration) = (Duration::from_millis(2), Duration::from_millis(5));
 
 /// Puts this thread, and all threads that it starts, into the scheduling class SCHED_FIFO. A thread of this class runs
@@ -50,7 +51,7 @@ impl Punctuality {
             std::thread::sleep(due.saturating_duration_since(Instant::now()));
             let woken = Instant::now();
             late.note(woken.saturating_duration_since(due));
-            // missed wake-ups are not made up
+            // wake-ups that were missed during a long delay are skipped
             due = due.max(woken.checked_sub(CYCLE).unwrap_or(woken));
         }
         Punctuality { late }
@@ -67,7 +68,7 @@ impl Punctuality {
         self.late.quantile_us(0.99) <= us(LATE.0) && self.late.max_us() <= us(LATE.1)
     }
 
-    /// Remedies for a high latency on this computer, one sentence each. Empty if the latency suffices.
+    /// Advice for the user if the latency is too high, one sentence for each remedy. Empty if the latency suffices.
     pub fn advice(&self, class: Class) -> Vec<String> {
         if self.is_good() {
             return Vec::new();
@@ -96,7 +97,7 @@ impl fmt::Display for Punctuality {
 /// Scheduling class of the companion's threads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// The default class.
+    /// The default class of the operating system.
     Usual,
     /// The real-time class SCHED_FIFO.
     RealTime,
@@ -111,7 +112,7 @@ fn load() -> String {
         .map_or_else(String::new, |load| format!(" (load {load} on {processors} processors)"))
 }
 
-/// Advice on the processor's frequency governor, if it saves power.
+/// Advice on the processor's frequency governor, if it is not `performance`; `None` if it is or if it is unknown.
 fn governor() -> Option<String> {
     let path = "/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor";
     let governor = std::fs::read_to_string(path).ok()?;

@@ -1,13 +1,14 @@
-//! Timestamps of recorded packets: time of day at the start plus the time of a monotonic clock.
+//! Timestamps of recorded packets: the time of day at the start of the recording plus the time since then on a monotonic
+//! clock.
 
 use std::time::{Instant, SystemTime};
 
-/// Timestamps of one recording. Changes of the system time in flight have no effect, so a replay computes the same ages
-/// of states. Timestamps of successive packets differ, which separates the packets.
+/// Timestamps of one recording. A change of the system time in flight has no effect on them. A replay thus sees the same times
+/// between packets as the flight. Two successive packets have different timestamps, so that a reader can separate them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stamps {
     started: Instant,
-    /// µs since 1970 at the start.
+    /// Time of day at the start of the recording, µs since 1970.
     epoch_us: u64,
     last: Option<u64>,
 }
@@ -31,7 +32,7 @@ fn us_since(started: Instant) -> u64 {
     started.elapsed().as_micros() as u64
 }
 
-/// Microseconds since 1970, as in `.tlog` files.
+/// The time of day, µs since 1970, as in `.tlog` files.
 pub(super) fn unix_us() -> u64 {
     SystemTime::now()
         .duration_since(SystemTime::UNIX_EPOCH)
@@ -50,7 +51,7 @@ mod tests {
         let us = |us| started + Duration::from_micros(us);
         let first = stamps.of(us(1000));
         assert_eq!(stamps.of(us(301_000)) - first, 300_000);
-        // a reply is sent in the same microsecond as the next arrival
+        // two packets in the same microsecond, such as a reply and the next arrival
         let [one, two] = [us(400_000), us(400_000)].map(|at| stamps.of(at));
         assert_eq!(two - one, 1);
         assert!(first.abs_diff(unix_us()) < 10_000_000);

@@ -25,15 +25,15 @@ pub struct Summary {
     pub signing: Option<SigningCounts>,
     /// Timing of the control loop.
     pub timing: Timing,
-    /// Derivatives of the aircraft estimated in flight, as in `Status::derivatives`; NaN if unknown.
+    /// Aerodynamic derivatives estimated in flight, in the order of `ESTIMATES`; NaN if unknown.
     pub derivatives: [f64; ESTIMATES.len()],
     /// Path of the recording and its counters; `None` without a recording.
     pub recording: Option<(PathBuf, Written)>,
 }
 
 impl Summary {
-    /// Writes `summary.txt` into the recording's folder. An existing file is not overwritten. Errors are ignored,
-    /// because the caller has the same text.
+    /// Writes `summary.txt` into the recording's folder. An existing file is not overwritten. Errors are ignored, because
+    /// the caller can print the same text.
     pub(super) fn save(&self) {
         if let Some((folder, _)) = &self.recording
             && let Ok(mut file) = File::create_new(folder.join("summary.txt"))
@@ -52,7 +52,7 @@ const QUANTITIES: [(&str, &str); ESTIMATES.len()] = [
 ];
 
 impl Summary {
-    /// One line with the known derivatives; none if all are unknown.
+    /// Writes a line with the known derivatives; writes nothing if all are unknown.
     fn write_derivatives(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let all = QUANTITIES.iter().zip(self.derivatives).filter(|(_, value)| value.is_finite());
         let known: Vec<String> =
@@ -63,7 +63,7 @@ impl Summary {
         }
     }
 
-    /// One line with the signing counters; none without signing.
+    /// Writes a line with the signing counters; writes nothing without signing.
     fn write_signatures(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Some(s) = &self.signing else { return Ok(()) };
         write!(

@@ -1,11 +1,11 @@
-//! Timing of the control loop: latency and frame intervals.
+//! Timing statistics of the control loop: the latency of commands and the intervals between state frames.
 
 use std::time::Duration;
 
-/// Longest duration with a bucket of its own, µs. The buckets are 1 µs wide. All longer durations share one bucket.
+/// Number of buckets with a width of 1 µs. One further bucket counts all longer durations.
 const RESOLVED_US: usize = 50_000;
 
-/// A histogram of durations with a fixed size.
+/// A histogram of durations, of fixed size.
 #[derive(Clone, Debug)]
 pub struct Histogram {
     buckets: Box<[u32]>,
@@ -33,13 +33,13 @@ impl Histogram {
         self.count
     }
 
-    /// Largest of the durations, µs; 0 without durations.
+    /// The largest duration added, µs; 0 if there is none.
     pub fn max_us(&self) -> f64 {
         self.max_us
     }
 
-    /// The quantile `share` (0..1) of the durations, µs, rounded up to the microsecond and at most 50 001 µs; NaN
-    /// without durations.
+    /// The quantile `share` (0..1) of the durations in µs, rounded up to a whole microsecond. It is at most 50 001 µs, and NaN if
+    /// there are no durations.
     pub fn quantile_us(&self, share: f64) -> f64 {
         let rank = ((share * self.count as f64).ceil() as u64).max(1);
         let mut seen = 0;
@@ -53,28 +53,28 @@ impl Histogram {
     }
 }
 
-/// The timing of a flight.
+/// Timing statistics of one flight.
 #[derive(Clone, Debug, Default)]
 pub struct Timing {
     /// Time from the arrival of a state frame to the sending of its command.
     pub latency: Histogram,
     /// Time between the arrivals of two state frames.
     pub interval: Histogram,
-    /// Number of missed cycles. In real time these are ticks with a latency above 10 ms. In lockstep these are states
-    /// that the vehicle sent again because it had no reply.
+    /// Number of missed cycles. In real time, a cycle is missed if the latency exceeds 10 ms. In lockstep, where the simulator
+    /// waits for each command, it is missed if the simulator sent its state again because it had no reply.
     pub missed: u64,
-    /// Number of ticks without a plan in time: the plan was late, or the planner was busy with an earlier request.
+    /// Number of ticks for which the planner gave no command in time, because it was late or busy with an earlier tick.
     pub late_plans: u64,
-    /// Number of states without a reply because newer states had arrived.
+    /// Number of states that got no reply, because a newer state had already arrived.
     pub overtaken: u64,
-    /// Number of stalls of more than 0.1 s.
+    /// Number of stalls: times of more than 0.1 s in which this computer did not run the program.
     pub stalls: u64,
     /// Length of the longest stall.
     pub longest_stall: Duration,
 }
 
 impl Timing {
-    /// Reason for which this computer was too slow for real time, in one sentence with the remedy; `None` if it was
+    /// A sentence for the user if this computer was too slow for real time, with the numbers and the remedy; `None` if it was
     /// fast enough.
     pub fn trouble(&self) -> Option<String> {
         let cycles = self.latency.count().max(1) as f64;
@@ -105,7 +105,7 @@ mod tests {
         for us in 0..1000 {
             histogram.note(Duration::from_micros(us));
         }
-        // Half of the durations 0, 1 … 999 µs do not exceed 499 µs. The end of this bucket is 500 µs.
+        // half of the durations 0, 1 … 999 µs lie in the buckets up to 499 µs, the last of which ends at 500 µs
         assert_eq!(histogram.quantile_us(0.5), 500.0);
         assert_eq!(histogram.quantile_us(0.99), 990.0);
         assert_eq!(histogram.quantile_us(1.0), 999.0);

@@ -1,5 +1,5 @@
-//! Coordinates of the trainable coefficients. A unit step of any coordinate has the same mean square effect on the
-//! state rates.
+//! Coordinates in which the coefficients of the prior are trained. The prior is the physical model before learning. Unit steps
+//! of all coordinates change the prior's state rates by the same mean square.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -12,16 +12,16 @@ use greylag_physics::point::AirData;
 use greylag_physics::rigid_body::{self, RigidBody};
 use greylag_physics::{Channel, State, Wrench};
 
-/// The name under which the product of inertia is trainable.
+/// Name of the trainable product of inertia Jxz.
 ///
-/// Mass and the other inertias are not trainable. Scaling moments and inertias together, or forces and mass together,
-/// does not change the motion. Therefore no data can separate mass and inertias from the coefficients.
+/// Mass and the other inertias are not trainable. Scaling moments and inertias together, or forces and mass together, does not
+/// change the motion. Therefore no data can separate mass and inertias from the coefficients of forces and moments.
 pub const JXZ: &str = "rigid_body.jxz_kgm2";
 
-/// Number of samples that determine the coordinates.
+/// Approximate number of samples from which the coordinates are computed.
 const SAMPLES: usize = 4096;
 
-/// Eigenvalue, relative to the largest one, up to which a direction counts as unidentifiable.
+/// Largest eigenvalue of an unidentifiable direction, relative to the largest eigenvalue of all.
 const UNSEEN: f64 = 1e-9;
 
 /// Transformation θ_p = θ_p0 + T η of the coordinates η to the coefficients θ_p of the prior. η has one entry for
@@ -33,21 +33,21 @@ const UNSEEN: f64 = 1e-9;
 /// the state.
 #[derive(Clone, Debug)]
 pub struct Basis {
-    /// Indices of the coefficients in the model's list. The length of the list is the index of Jxz.
+    /// Indices of the coefficients in the model's list of coefficients. An index equal to the length of the list stands for Jxz.
     pub places: Vec<usize>,
-    /// Initial coefficients θ_p0.
+    /// The coefficients θ_p0 before training.
     start: DVector<f64>,
-    /// Bounds that the model states, or else the physical bounds; `None` if a coefficient has no bounds.
+    /// Bounds that the model states, or else the physical bounds; `None` for Jxz.
     bounds: Vec<Option<(f64, f64)>>,
-    /// Prior information 1/σ² on θ_p0; zero if the model's file states no σ.
+    /// Prior information 1/σ² on θ_p0. It is zero for a coefficient for which the model file states no σ.
     information: DVector<f64>,
-    /// The transformation T.
+    /// The transformation matrix T.
     turn: DMatrix<f64>,
     /// Names of the coefficients that the data does not identify, or does not separate from other coefficients.
     pub unseen: Vec<String>,
 }
 
-/// Coefficients cannot be trained.
+/// Reason why the coefficients cannot be trained.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TrainableError {
     /// The model has no such coefficient.
@@ -72,7 +72,7 @@ pub enum TrainableError {
     },
 }
 
-/// Checks that the derivatives of `model` can be computed for training.
+/// Checks that the training can compute the derivatives of `model`.
 ///
 /// # Errors
 ///
@@ -96,7 +96,7 @@ pub fn trainable(model: &GreyBox) -> Vec<String> {
         let Some(kind) = Kind::from_id(about.id) else { continue };
         let count = about.coefficients.len();
         for (k, c) in about.coefficients[..count - about.shape].iter().enumerate() {
-            // a coefficient that changes the mass or inertia is excluded
+            // coefficients that change mass or inertia are excluded
             let one: Vec<f64> = (0..count).map(|i| if i == k { 0.1 } else { 0.0 }).collect();
             let (mut body, mut still) = (*model.bare_body(), *model.bare_body());
             kind.change(&one, &mut body);
@@ -109,13 +109,14 @@ pub fn trainable(model: &GreyBox) -> Vec<String> {
     names
 }
 
-/// Present values of the coefficients of `model`, then Jxz (kg m²).
+/// Present values of all coefficients of `model`, followed by Jxz (kg m²).
 pub fn values(model: &GreyBox) -> Vec<f64> {
     let coefficients = model.coefficients().iter().map(|c| c.value);
     coefficients.chain([model.bare_body().jxz]).collect()
 }
 
-/// The present value of a coefficient, or of Jxz, by its full name.
+/// The present value of the coefficient `name` (`effect.coefficient`) or of Jxz ([`JXZ`]). `None` if there is no such
+/// coefficient.
 pub fn value(model: &GreyBox, name: &str) -> Option<f64> {
     match name {
         JXZ => Some(model.bare_body().jxz),
@@ -124,10 +125,10 @@ pub fn value(model: &GreyBox, name: &str) -> Option<f64> {
 }
 
 impl Basis {
-    /// Coordinates for the coefficients `names` of `model`, from their effect over `tracks`.
+    /// Computes coordinates for the coefficients `names` of `model` from their effect on the state rates over `tracks`.
     ///
     /// # Errors
-    /// If the model lacks a coefficient, or one cannot be trained.
+    /// If the model lacks one of the coefficients, or if one of them cannot be trained.
     pub fn new(
         model: &GreyBox,
         names: &[String],
@@ -165,7 +166,7 @@ impl Basis {
         Ok(Basis { start, bounds, information, turn, unseen, places })
     }
 
-    /// Number of coordinates.
+    /// Number of coordinates of the training.
     pub fn len(&self) -> usize {
         self.turn.ncols()
     }
@@ -180,8 +181,7 @@ impl Basis {
         (0..self.turn.nrows()).map(move |i| self.turn[(i, k)])
     }
 
-    /// Converts a gradient with respect to coefficients and Jxz (`all`) to the gradient with respect to the
-    /// coordinates.
+    /// Converts a gradient to coordinates. `all` is the gradient with respect to all coefficients of the model and Jxz.
     pub fn slopes(&self, all: &[f64]) -> Vec<f64> {
         let of = |k: usize| {
             self.places.iter().enumerate().map(move |(i, p)| self.turn[(i, k)] * all[*p])
@@ -189,14 +189,14 @@ impl Basis {
         (0..self.len()).map(|k| of(k).sum()).collect()
     }
 
-    /// Prior information on the coordinates from the stated standard deviations: Tᵀ Σ⁻¹ T. A coefficient without a
-    /// stated standard deviation contributes zero.
+    /// Prior information on the coordinates: Tᵀ Σ⁻¹ T, with the stated standard deviations of the coefficients in Σ. A
+    /// coefficient without a stated standard deviation contributes zero.
     pub fn prior_information(&self) -> DMatrix<f64> {
         let weighed = DMatrix::from_diagonal(&self.information) * &self.turn;
         self.turn.transpose() * weighed
     }
 
-    /// Sets the coefficients of `model` from `coordinates`, clamped to their bounds.
+    /// Sets the coefficients of `model` to the values at `coordinates`, clamped to their bounds.
     pub fn apply(&self, model: &mut GreyBox, coordinates: &[f64]) {
         let theta = &self.start + &self.turn * DVector::from_column_slice(coordinates);
         let mut values: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
@@ -205,7 +205,7 @@ impl Basis {
             match values.get_mut(*place) {
                 Some(value) => *value = bounds.map_or(*theta, |(low, high)| theta.clamp(low, high)),
                 None => {
-                    // jx jz must exceed jxz²
+                    // the inertia matrix is positive definite only if jx jz exceeds jxz²
                     let most = 0.99 * (body.jx * body.jz).sqrt();
                     body.jxz = theta.clamp(-most, most);
                 }
@@ -241,7 +241,7 @@ fn gram(model: &GreyBox, places: &[usize], tracks: &[Track]) -> DMatrix<f64> {
     gram / count.max(1.0)
 }
 
-/// Derivatives ∂F_p/∂θ of the prior's state rates at sample `k`, with respect to every coefficient, then to Jxz.
+/// Derivatives ∂F_p/∂θ of the prior's state rates at sample `k`: one entry for each coefficient of the model, then one for Jxz.
 pub(crate) fn columns(model: &GreyBox, track: &Track, k: usize) -> Vec<[f64; 8]> {
     let (state, controls) = (&track.states[k], &track.controls[k]);
     let air = model.air(state, track.altitude[k]);
@@ -259,21 +259,21 @@ pub(crate) fn columns(model: &GreyBox, track: &Track, k: usize) -> Vec<[f64; 8]>
     columns
 }
 
-/// The state rates due to a wrench alone.
+/// The part of the state rates that is due to the aerodynamic and propulsive forces and moments `wrench`.
 pub(crate) fn rate_of(model: &GreyBox, state: &State, air: &AirData, wrench: &Wrench) -> [f64; 8] {
     let still = rigid_body::state_rate(state, air, [0.0; 3], [0.0; 3]).to_array();
     let none = State { p: 0.0, q: 0.0, r: 0.0, ..*state };
     let force = rigid_body::body_force(wrench, air, model.axes);
     let moment = [4, 5, 6].map(|c| wrench.get(Channel::ALL[c]));
-    // without rotation the gyroscopic terms vanish and the angular acceleration is linear in the moment
+    // without rotation there are no gyroscopic terms, and the angular acceleration is linear in the moment
     let spin = rigid_body::angular_acceleration(&model.body, &none, moment);
     let push = force.map(|f| f / model.body.mass);
     let rate = rigid_body::state_rate(state, air, push, spin).to_array();
     std::array::from_fn(|i| rate[i] - still[i])
 }
 
-/// T with Tᵀ G T = 1 on the identifiable directions, and the indices of the coefficients that are mostly outside
-/// these directions.
+/// Returns a matrix T with Tᵀ G T = 1, where G is `gram`. Its columns span the identifiable directions. Also returns the indices
+/// of the coefficients that are mostly outside these directions.
 fn whiten(gram: &DMatrix<f64>) -> (DMatrix<f64>, Vec<usize>) {
     let n = gram.nrows();
     if n == 0 {
@@ -291,7 +291,8 @@ fn whiten(gram: &DMatrix<f64>) -> (DMatrix<f64>, Vec<usize>) {
     let turn = DMatrix::from_fn(n, seen.len(), |i, k| {
         unit(i) * eigen.eigenvectors[(i, seen[k])] / eigen.eigenvalues[seen[k]].sqrt()
     });
-    // more than half of the coefficient's direction is unidentifiable
+    // a coefficient counts as unidentifiable if more than half of its unit vector's squared length is outside the identifiable
+    // directions
     let lost = |i: &usize| {
         let kept: f64 = seen.iter().map(|k| eigen.eigenvectors[(*i, *k)].powi(2)).sum();
         kept < 0.5

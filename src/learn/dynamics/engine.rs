@@ -1,4 +1,5 @@
-//! Loss and gradient of minibatches in the chosen arithmetic and vector width.
+//! Computes the loss of a minibatch and its gradient. A minibatch is a set of windows (short sections of flights); in each
+//! window the model is simulated from the recorded start (a rollout) and compared with the recorded states.
 
 use crate::dynamics::kernel::Double;
 #[cfg(target_arch = "aarch64")]
@@ -9,17 +10,17 @@ use crate::dynamics::loss::{Loss, Minibatch, Objective};
 use crate::dynamics::rollout::{Gradient, Subject};
 use crate::dynamics::windows::{Track, Window};
 
-/// Arithmetic of an engine.
+/// Number format and parallelism of the computation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arithmetic {
-    /// Blocks of single-precision lanes. Processors without fused multiply-add (x86 from before 2013) use
-    /// [`Double`](Arithmetic::Double) instead.
+    /// Several rollouts at once in single precision, one in each lane of a SIMD vector. On processors without fused
+    /// multiply-add (x86 from before 2013), [`Double`](Arithmetic::Double) is used instead.
     Lanes,
-    /// One rollout at a time in double precision: slow, for tests.
+    /// One rollout at a time in double precision. It is slow and is used for tests.
     Double,
 }
 
-/// Computes losses and gradients of minibatches. Memory is allocated only by `new`.
+/// Computes losses and gradients of minibatches. Only [`Engine::new`] allocates memory.
 #[derive(Clone, Debug)]
 pub struct Engine(Kind);
 
@@ -35,7 +36,7 @@ enum Kind {
 }
 
 impl Kind {
-    /// The kind for the widest vectors of the processor; `None` without fused multiply-add.
+    /// The kind for the widest SIMD vectors of the processor; `None` if the processor has no fused multiply-add.
     #[cfg_attr(
         not(any(target_arch = "x86_64", target_arch = "aarch64")),
         expect(unused_variables, reason = "elsewhere no multiply-add is known to be fused")
@@ -65,11 +66,11 @@ impl Engine {
         Engine(lanes.unwrap_or_else(double))
     }
 
-    /// The loss of `windows` of `steps` steps, with its gradient. The result is the same to the bit on any number of
-    /// cores.
+    /// The loss over `windows` of `tracks` for the model `subject`, and its gradient. Each window has `steps` steps. The result
+    /// is the same to the bit on any number of cores.
     ///
     /// # Panics
-    /// If there are more windows than the engine was made for, or longer ones.
+    /// If the engine was made for fewer windows or fewer steps.
     pub fn step(
         &mut self,
         subject: &Subject,
@@ -89,7 +90,7 @@ impl Engine {
         }
     }
 
-    /// The loss without its gradient.
+    /// The same loss, without its gradient.
     ///
     /// # Panics
     ///

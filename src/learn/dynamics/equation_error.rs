@@ -1,4 +1,5 @@
-//! Initial coefficients of the prior by equation error, before any rollout.
+//! Initial coefficients of the prior by equation error, before the training on rollouts. The prior is the physical part of
+//! the model. The residual is the network that learns the rest.
 //!
 //! The prior's state rates F_p are linear in the trained coefficients. Over a short window, the change of the
 //! measured state less the integral of F_p along the measured path therefore gives a linear regression. A gradient
@@ -42,10 +43,11 @@ const REACH: f64 = 4.685;
 /// integration error along the measured path.
 const FLOOR: f64 = 1e-3;
 
-/// Rates that depend on forces and moments: airspeed, p, q, r, alpha, beta.
+/// Channels of the regression: indices of the states whose rates depend on forces and moments (airspeed, p, q, r, alpha,
+/// beta).
 pub(super) const CHANNELS: [usize; 6] = [2, 3, 4, 5, 6, 7];
 
-/// Channels with nuisance terms over the flow angles.
+/// Forces that may have nuisance terms over the flow angles.
 const FORCES: [Channel; 3] = [Channel::Drag, Channel::Lift, Channel::Side];
 
 /// Number of nuisance terms: 1, α, α², α³, β².
@@ -60,11 +62,11 @@ pub(super) enum Weighting {
     Alike,
 }
 
-/// Regression row of a window or a sample: the error of each channel in units of x_c, and the derivatives of the
-/// prediction.
+/// Regression row of a window or a sample: the error of each channel in units of the state's characteristic scale x_c,
+/// and the derivatives of the prediction.
 pub(super) struct Row {
     pub error: [f64; 6],
-    /// Derivatives with respect to the coordinates, then with respect to the nuisance coefficients.
+    /// Derivatives with respect to the coordinates of the `Basis`, then with respect to the nuisance coefficients.
     pub slopes: Vec<[f64; 6]>,
 }
 
@@ -77,7 +79,7 @@ impl Row {
     }
 }
 
-/// The fitted parameters.
+/// The fitted parameters: the coordinates of the coefficients, and the nuisance coefficients.
 pub(super) struct Fit<'a> {
     pub basis: &'a Basis,
     /// The forces with nuisance terms: those on which no trained coefficient acts.
@@ -86,8 +88,8 @@ pub(super) struct Fit<'a> {
     lacking: Vec<f64>,
 }
 
-/// The coordinates η at which `prior` fits `tracks` best. Windows that `prior` cannot fit (a stall outside its
-/// structure) have little or no weight.
+/// The coordinates η of `basis` at which `prior` fits `tracks` best. Windows with a motion that `prior` cannot represent,
+/// such as a stall, have little or no weight.
 pub fn coordinates(prior: &GreyBox, basis: &Basis, tracks: &[Track]) -> Vec<f64> {
     if basis.is_empty() {
         return Vec::new();
@@ -128,7 +130,7 @@ fn forces_along(prior: &GreyBox, basis: &Basis) -> Vec<Channel> {
 }
 
 impl<'a> Fit<'a> {
-    /// The coordinates of `basis` and the nuisance coefficients, all zero.
+    /// A fit of the coordinates of `basis` that starts with nuisance coefficients of zero.
     pub fn new(prior: &GreyBox, basis: &'a Basis) -> Fit<'a> {
         let along = forces_along(prior, basis);
         let lacking = vec![0.0; TERMS * along.len()];
@@ -206,9 +208,9 @@ fn quadrature(integrator: Integrator, channel: usize, k: usize) -> f64 {
     }
 }
 
-/// The weighted least-squares step of the fitted parameters. `known` holds the prior information on the first
-/// parameters and their deviation from the prior mean. `None` if there are no rows or the normal equations cannot be
-/// solved.
+/// The weighted least-squares step of the fitted parameters. `known` holds the information matrix of the prior distribution
+/// of the first parameters, and their deviation from the prior mean. `None` if there are no rows or the normal equations
+/// cannot be solved.
 pub(super) fn solve(
     rows: &[Row],
     count: usize,

@@ -1,4 +1,6 @@
-//! The model folder that training writes: `model.toml`, its airframe, `residual.safetensors`.
+//! Writes the folder of a trained model. The model is the prior (the physical model) plus the residual, a neural network that
+//! learns the rest of the state rates. The files are `model.toml`, the airframe file, the prior's effect files and
+//! `residual.safetensors`.
 
 use std::path::{Path, PathBuf};
 
@@ -20,12 +22,12 @@ pub enum ExportError {
         /// The operating system's error.
         why: std::io::Error,
     },
-    /// The prior's file has changed since it was read.
+    /// The model file cannot be made from the prior's file, for example because that file has changed since it was read.
     #[error("cannot write a model after {path}: {why}; give the prior's file unchanged", path = path.display())]
     Prior {
         /// Path of the prior's file.
         path: PathBuf,
-        /// Description of the change or of the missing entry.
+        /// Description of the fault.
         why: String,
     },
 }
@@ -40,9 +42,9 @@ pub const RESIDUAL: &str = "residual.safetensors";
 /// Texts written into a model file.
 #[derive(Clone, Copy, Debug)]
 pub struct Text<'a> {
-    /// Training data in one sentence.
+    /// A sentence on the training data, which becomes the model's description.
     pub about: &'a str,
-    /// Full names of the coefficients that were trained.
+    /// Names of the trained coefficients of the prior, as `effect.coefficient`.
     pub trained: &'a [String],
 }
 
@@ -51,7 +53,7 @@ pub struct Text<'a> {
 ///
 /// # Errors
 ///
-/// If a file cannot be read or written, or the prior's file has changed since it was read.
+/// If a file cannot be read or written, if the prior's file has changed since it was read, or if `model` has no residual.
 pub fn save(
     model: &GreyBox,
     prior: &Path,
@@ -67,7 +69,7 @@ pub fn save(
     let airframe = beside.join(airframe);
     let airframe_text = std::fs::read(&airframe).map_err(fail("read", &airframe))?;
     let own = effect_files(&table, beside)?;
-    // a model that is trained further keeps its name
+    // the name of a model that is trained again does not get a second suffix
     let base = model.name.strip_suffix("-learned").unwrap_or(&model.name);
     let name: String = format!("{base}-learned").chars().take(64).collect();
     let mut set = |key: &str, value: &str| table.insert(key.into(), value.into());
@@ -103,14 +105,15 @@ pub fn save(
     write(MODEL, text.as_bytes())
 }
 
-/// The error of a file that cannot be read or written.
+/// Makes the error of a file that cannot be read or written. `doing` is the operation.
 fn fail(doing: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> ExportError + use<> {
     let path = path.to_owned();
     move |why| ExportError::File { doing, path, why }
 }
 
-/// Name and content of each effect file that the model file `table` names, relative to the folder `beside`. A folder
-/// contributes its `.toml` files, as when the model is read. Files of the same name are renamed.
+/// Name and content of each effect file (a file that defines one effect by a formula) that the model file `table` names. Paths
+/// are relative to the folder `beside`. A path to a folder stands for its `.toml` files, as when the model is read. Files whose
+/// name is already taken are renamed.
 fn effect_files(table: &toml::Table, beside: &Path) -> Result<Vec<(String, Vec<u8>)>, ExportError> {
     let mut own: Vec<(String, Vec<u8>)> = Vec::new();
     for effect in table.get("effect_files").and_then(|e| e.as_array()).into_iter().flatten() {
@@ -129,7 +132,7 @@ fn effect_files(table: &toml::Table, beside: &Path) -> Result<Vec<(String, Vec<u
     Ok(own)
 }
 
-/// The path itself, or the `.toml` files of the folder at `path` in the order of their names.
+/// If `path` is a folder, its `.toml` files in the order of their names; otherwise `path` itself.
 fn files_of(path: &Path) -> std::io::Result<Vec<PathBuf>> {
     if !path.is_dir() {
         return Ok(vec![path.into()]);
@@ -141,8 +144,8 @@ fn files_of(path: &Path) -> std::io::Result<Vec<PathBuf>> {
     Ok(all)
 }
 
-/// Writes the coefficient `name` of `model` into the model file's `table`. An entry is created if the value came from
-/// an effect file. `None` if the table lacks the effect.
+/// Writes the value of the coefficient `name` of `model` into the model file's `table`. If the table has no entry for it, because
+/// its value stood in an effect file, an entry is created. `None` if the table lacks the effect.
 fn write_trained(
     table: &mut toml::Table,
     model: &GreyBox,
@@ -169,7 +172,7 @@ fn write_trained(
     Some(())
 }
 
-/// Provenance for the residual's file: `model` trained on `data` (SHA-256, hexadecimal).
+/// Provenance for the residual's file. `data` is the SHA-256 of the training data in hexadecimal, `seed` the training's seed.
 pub fn origin(model: &GreyBox, data: &str, seed: u64) -> Origin {
     Origin {
         schema: Origin::SCHEMA.into(),

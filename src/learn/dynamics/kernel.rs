@@ -1,8 +1,9 @@
-//! Functions of the forward and the reverse pass, each compiled once for each instruction set.
+//! Functions of the model training, each compiled once for each instruction set. A forward pass simulates recorded
+//! flights from their states. A reverse pass computes the gradient of the loss.
 //!
-//! The prior is by far the largest part of the code and is called instead of inlined. Its callers are compiled for
-//! the same instructions. Both integration schemes share one copy of the prior's value and of its derivatives with
-//! respect to the state and to the coefficients.
+//! The prior is the physical part of the model. Its code is by far the largest part, so it is called instead of inlined.
+//! Its callers are compiled for the same instructions. Both integration schemes share one copy of the code that computes
+//! the prior's outputs and their derivatives with respect to the state and to the coefficients.
 
 use crate::dynamics::packet::Packet;
 use crate::dynamics::prior::{At, PriorOutputs, Slopes};
@@ -13,24 +14,24 @@ use greylag_num::Base;
 #[cfg(target_arch = "x86_64")]
 use greylag_num::{Avx2, Avx512};
 
-/// A set of instructions with its number type.
+/// A set of processor instructions with its number type.
 pub trait InstructionSet: Copy + Send + Sync {
-    /// The number type of a pass.
+    /// The number type of a pass: a vector with one lane for each rollout, the simulation of a section of a flight.
     type Number: Packet;
-    /// Calls [`At::ask`], which evaluates the prior.
+    /// Calls [`At::ask`], which evaluates the prior. `WHOLE` is explained there.
     fn ask<const WHOLE: bool>(
         self,
         model: &GreyBox,
         at: &At<Self::Number>,
     ) -> PriorOutputs<Self::Number>;
-    /// Calls [`At::slope`], which computes the gradient with respect to the state.
+    /// Calls [`At::slope`], which computes the gradient of the loss with respect to the state.
     fn slope<const WHOLE: bool>(
         self,
         model: &GreyBox,
         at: &At<Self::Number>,
         slopes: &Slopes<Self::Number>,
     ) -> [Self::Number; 8];
-    /// Calls [`At::coefficients`], which adds the gradient with respect to the coefficients.
+    /// Calls [`At::coefficients`], which adds the gradient of the loss with respect to the coefficients to `sums`.
     fn coefficients<const WHOLE: bool>(
         self,
         model: &GreyBox,
@@ -38,9 +39,9 @@ pub trait InstructionSet: Copy + Send + Sync {
         slopes: &Slopes<Self::Number>,
         sums: &mut [Self::Number],
     );
-    /// Calls [`Pass::forward`] on a block.
+    /// Calls [`Pass::forward`] on a block of rollouts.
     fn forward(self, pass: &Pass<Self>, trace: &mut Trace<Self::Number>) -> (Sums, Self::Number);
-    /// Calls [`Pass::reverse`] on a block.
+    /// Calls [`Pass::reverse`] on a block of rollouts.
     fn reverse(
         self,
         pass: &Pass<Self>,
@@ -50,16 +51,16 @@ pub trait InstructionSet: Copy + Send + Sync {
     );
 }
 
-/// One rollout at a time in double precision, with the baseline instructions: for tests.
+/// One rollout at a time in double precision, with the baseline instructions of the target. It serves for tests.
 #[derive(Clone, Copy, Debug)]
 pub struct Double;
 
-/// Lanes in 256 bits with fused multiply-add.
+/// AVX2 with fused multiply-add: vectors of 256 bits.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy, Debug)]
 pub struct In256(());
 
-/// Lanes in 512 bits.
+/// AVX-512: vectors of 512 bits.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy, Debug)]
 pub struct In512(());
@@ -81,7 +82,7 @@ impl In512 {
     }
 }
 
-/// Lanes with the baseline instructions of the target.
+/// Vectors with the baseline instructions of the target.
 #[cfg(target_arch = "aarch64")]
 #[derive(Clone, Copy, Debug)]
 pub struct Neon;

@@ -1,4 +1,7 @@
-//! The objective over a minibatch, eqs. (20) to (24) of \[GSFM26\], with its gradient.
+//! The objective over a minibatch of rollouts, eqs. (20) to (24) of \[GSFM26\], with its gradient.
+//!
+//! The trained model is a prior, which is a physical model, plus a residual network. A rollout simulates the model from a
+//! recorded state with the recorded controls. The objective penalises the prediction error and the size of the residual.
 
 use rayon::prelude::*;
 
@@ -23,7 +26,7 @@ pub struct Objective {
     pub scale: [f64; 8],
     /// Penalty on the residual.
     pub penalty: Penalty,
-    /// Divisor of the prediction error: L_prior of eq. (23), or 1.
+    /// Divisor of the prediction loss: L_prior of eq. (23), which is the loss of the prior alone, or 1.
     pub unit: f64,
     /// λ of eq. (24): the penalty is divided by it.
     pub lambda: f64,
@@ -45,7 +48,8 @@ pub struct Loss {
 }
 
 impl Objective {
-    /// The loss for `sums` over `points` points, with the derivatives of the objective with respect to the sums.
+    /// The loss that follows from the `sums` over `points` steps of rollouts, and the derivatives of the objective with respect
+    /// to the sums.
     pub fn of(&self, sums: &Sums, points: f64) -> (Loss, SumSlopes) {
         let prediction = sums.error / points;
         let [prior, learned] = [sums.prior, sums.learned].map(|s| (s / points).sqrt());
@@ -92,7 +96,7 @@ impl Gradient {
     }
 }
 
-/// Memory of one block of lanes.
+/// Memory of one block: rollouts that are simulated together, one in each lane of a SIMD vector.
 #[derive(Clone, Debug)]
 struct Work<R> {
     windows: Vec<Window>,
@@ -133,7 +137,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Minibatch<S> {
         Minibatch { works: vec![work; windows.div_ceil(R::WIDTH)], set, gradient }
     }
 
-    /// The loss of `windows` with its gradient.
+    /// The loss over the rollouts of `windows`, and the gradient of the objective.
     ///
     /// Blocks are summed in order. The result therefore does not depend on the number of cores.
     ///
@@ -215,7 +219,8 @@ impl<R: Packet, S: InstructionSet<Number = R>> Minibatch<S> {
 }
 
 impl<R: Packet> Work<R> {
-    /// Integrates the block. Rollouts with a state that is not finite are removed, and the others are integrated again.
+    /// Simulates the rollouts of the block. Rollouts with a state that is not finite are removed, and the others are simulated
+    /// again.
     fn fly(
         &mut self,
         subject: &Subject,

@@ -1,4 +1,5 @@
-//! Learning a grey-box model from flights: prior coefficients and residual together, section IV-A of \[GSFM26\].
+//! Learning a grey-box model from flights: the coefficients of its physical effects (the prior) and a network (the residual)
+//! together, section IV-A of \[GSFM26\] (T. Guerin et al., 2026).
 
 pub(super) mod basis;
 pub(super) mod engine;

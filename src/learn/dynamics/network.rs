@@ -1,4 +1,4 @@
-//! Forward pass of a network with stored activations, and its backward pass.
+//! Forward pass of the residual's network, which stores the activations, and the backward pass, which uses them.
 
 use crate::dynamics::packet::Packet;
 use greylag_model::residual::{INPUTS, OUTPUTS};
@@ -12,7 +12,7 @@ const TILE: usize = 4;
 #[derive(Clone, Debug)]
 pub struct Passes {
     network: Dense,
-    /// For each layer, the transposed weights `[out, in]` for the backward pass, and a zero bias for each input.
+    /// For each layer: transposed weights `[out, in]` for the backward pass, and zeros as its biases, one per input.
     transposed: Vec<(Vec<f32>, Vec<f32>)>,
 }
 
@@ -27,12 +27,12 @@ impl Passes {
         passes
     }
 
-    /// The underlying network.
+    /// The network with its present parameters.
     pub fn network(&self) -> &Dense {
         &self.network
     }
 
-    /// Updates the parameters by `change`.
+    /// Applies `change` to the parameters.
     pub fn update(&mut self, change: impl FnOnce(&mut [f32])) {
         change(self.network.parameters_mut());
         self.renew();
@@ -49,18 +49,18 @@ impl Passes {
         }
     }
 
-    /// Number of activations that the forward pass stores for each sample: those of all layers except the last.
+    /// Number of activations that the forward pass stores for each sample: those of the inputs and of the hidden layers.
     pub fn trace(&self) -> usize {
         let sizes = self.network.sizes();
         sizes[..sizes.len() - 1].iter().sum()
     }
 
-    /// Number of gradients that the backward pass stores for each sample: those of all layers except the input.
+    /// Number of gradients that the backward pass stores for each sample: those of all layers except the inputs.
     pub fn slopes(&self) -> usize {
         self.network.sizes()[1..].iter().sum()
     }
 
-    /// The network's output. `trace` receives the activations.
+    /// Returns the network's output and stores the activations in `trace`.
     #[inline(always)]
     pub fn forward<R: Real>(&self, input: [R; INPUTS], trace: &mut [R]) -> [R; OUTPUTS] {
         let mut output = [R::zero(); OUTPUTS];
@@ -81,8 +81,8 @@ impl Passes {
         output
     }
 
-    /// The gradient with respect to the inputs, from the gradient `output` with respect to the outputs. `slopes` receives the
-    /// gradients with respect to all pre-activations.
+    /// Returns the loss gradient with respect to the inputs. `output` is the loss gradient with respect to the outputs. The
+    /// gradients with respect to all pre-activations are stored in `slopes`.
     #[inline(always)]
     pub fn backward<R: Real>(
         &self,
@@ -114,8 +114,8 @@ impl Passes {
         input
     }
 
-    /// Adds the contributions of several samples to `gradient`. `traces` and `slopes` hold the data of one sample after
-    /// another.
+    /// Adds the contributions of several samples to `gradient`, the loss gradient with respect to the parameters. `traces` and
+    /// `slopes` hold the stored data of the samples, one sample after another.
     #[inline(always)]
     pub fn gather<R: Packet>(&self, traces: &[R], slopes: &[R], gradient: &mut [f64]) {
         let sizes = self.network.sizes();
@@ -140,7 +140,8 @@ impl Passes {
     }
 }
 
-/// Gradient of a layer's weights: Σ over samples of input activation · gradient of the pre-activation.
+/// Data for the gradient of a layer's weights. The gradient is the sum over the samples of input activation times the gradient
+/// with respect to the pre-activation.
 struct Sides<'a, R> {
     traces: &'a [R],
     slopes: &'a [R],

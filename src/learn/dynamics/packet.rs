@@ -1,4 +1,5 @@
-//! Packets: a scalar or a block of lanes, for simultaneous rollouts.
+//! Packets: number types that hold one value for each of several simulations that are computed at once. A packet is a scalar
+//! (one simulation) or a SIMD vector (one simulation per lane).
 
 use greylag_num::{Lanes, Packed, ROW, Real, Register};
 
@@ -6,7 +7,7 @@ use greylag_num::{Lanes, Packed, ROW, Real, Register};
 pub trait Packet: Real {
     /// Number of lanes.
     const WIDTH: usize;
-    /// A packet of `lane(0)`, `lane(1)`, …
+    /// The packet with the value `lane(i)` in each lane i.
     fn gather(lane: impl FnMut(usize) -> f64) -> Self;
     /// The number in lane `index`.
     fn lane(&self, index: usize) -> f64;
@@ -33,7 +34,7 @@ impl Packet for f64 {
     }
 }
 
-/// One row of lanes in any vector register.
+/// One row of [`ROW`] single-precision lanes, for any SIMD instruction set.
 impl<const N: usize, const FUSED: bool, V: Register> Packet for Lanes<N, FUSED, V> {
     const WIDTH: usize = {
         assert!(N == ROW && V::LANES == ROW, "a packet is one row");

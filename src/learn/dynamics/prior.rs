@@ -1,4 +1,5 @@
-//! The prior at a point: state rates, and their derivatives with respect to state and coefficients.
+//! The prior, the physical part of a model, at one point: state rates, and their derivatives with respect to the state and
+//! the coefficients. Most effects depend on the point alone. Dependent effects also use the forces of other effects.
 
 use crate::dynamics::packet::Packet;
 use greylag_model::{GreyBox, Starting, Weights, parted};
@@ -51,8 +52,8 @@ impl<R: Real> At<R> {
         AirData::new(&self.state, self.density, ALOFT, &model.airframe.geometry)
     }
 
-    /// Outputs of the prior of `model`. With `WHOLE`, all effects are evaluated. Without it, only the effects that
-    /// need nothing but the point are evaluated, and the code of the others is not compiled in.
+    /// Outputs of the prior of `model`. With `WHOLE`, all effects are evaluated. Without it, the dependent effects are
+    /// left out, and their code is not compiled in.
     #[inline(always)]
     pub fn ask<const WHOLE: bool>(&self, model: &GreyBox) -> PriorOutputs<R> {
         let air = self.air(model);
@@ -115,8 +116,8 @@ pub fn fixed<R: Real>(x: R) -> Dual<2, R> {
 
 /// Gradient of the loss with respect to `inputs`.
 ///
-/// The derivatives are computed two at a time because the compiler inlines the whole prior for each direction. The
-/// evaluation of the network takes far more time.
+/// The function is evaluated once for every two inputs. More inputs at a time would make the compiled code larger, because
+/// the prior is inlined for each. The time matters little: the network takes far more.
 #[inline(always)]
 pub fn transposed<R: Real, const N: usize>(
     inputs: &[R; N],
@@ -144,7 +145,7 @@ pub fn transposed<R: Real, const N: usize>(
     sums
 }
 
-/// Adds the derivatives of the output `out` times `slope`, the derivative of the loss with respect to this output.
+/// Adds the gradient of the output `out` to `sum`, multiplied by the derivative `slope` of the loss with respect to `out`.
 #[inline(always)]
 pub fn add<R: Real>(sum: &mut [R; 2], out: &Dual<2, R>, slope: R) {
     for (sum, g) in sum.iter_mut().zip(out.gradient) {
@@ -156,8 +157,8 @@ impl<R: Packet> At<R> {
     /// Adds the gradient of the loss with respect to the coefficients to `sums`, and the derivative with respect to
     /// Jxz to the last entry.
     ///
-    /// The gradient is exact for effects that are linear in their coefficients. Without `WHOLE`, all effects must
-    /// need nothing but the point.
+    /// The gradient is exact for effects that are linear in their coefficients. Without `WHOLE`, the model must not have
+    /// dependent effects.
     #[inline(always)]
     pub fn coefficients<const WHOLE: bool>(
         &self,
@@ -195,8 +196,8 @@ impl<R: Packet> At<R> {
 }
 
 impl<R: Packet> At<R> {
-    /// Adds the gradient with respect to the coefficients of all effects, from the gradient `wrench` with respect to
-    /// forces and moments. Returns the moments.
+    /// Adds the gradient of the loss with respect to the coefficients of all effects to `sums`. `wrench` is its gradient
+    /// with respect to forces and moments. Returns the moments of all effects.
     ///
     /// Dependent effects use three sums over the independent effects: at the point, with neutral surfaces, and with
     /// neutral surfaces and zero body rates. The gradient with respect to these sums is propagated to the
@@ -309,7 +310,8 @@ impl<R: Real> Weights<Dual<2, R>> for Marked<'_> {
     }
 }
 
-/// Collects the terms of a prior's effects: the gradient with respect to the coefficients, and the moments.
+/// Collects the terms of the independent effects: the gradient of the loss with respect to their coefficients, and their
+/// moments.
 struct Tally<'a, R> {
     model: &'a GreyBox,
     first: usize,

@@ -1,10 +1,10 @@
-//! Joint training by variable projection (Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973).
+//! Joint training of prior and residual by variable projection (Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973). The prior is
+//! the physical part of the model. The residual is the neural network that is added to the prior's state rates F_p.
 //!
-//! Prior and residual are learned together, and the prior's state rates F_p are linear in its coefficients θ. For a
-//! given residual, the best coefficients leave no part of the residual in the span of ∂F_p/∂θ. They follow from a
-//! linear regression of the residual on these derivatives, over the samples of the flights. The gradient of the
-//! rollouts approaches the same condition in the mean square. In the mean square, a stall outside the prior's
-//! structure dominates the residual and biases the coefficients. Tukey's weights exclude the stall.
+//! F_p is linear in the prior's coefficients θ. The part of the residual that lies in the span of ∂F_p/∂θ belongs to the prior.
+//! A linear regression of the residual on ∂F_p/∂θ over the samples of the flights finds this part, and the coefficients take it
+//! over. Least squares would let a stall, which the prior cannot represent, dominate the regression and bias the coefficients.
+//! Tukey's weights exclude such samples.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -17,11 +17,11 @@ use greylag_model::{GreyBox, Residual};
 /// Largest number of samples used.
 const SAMPLES: usize = 8192;
 
-/// Number of reweighting iterations.
+/// Number of iterations in which the samples are weighted anew.
 const PASSES: usize = 8;
 
-/// Step of the coordinates of `basis` that moves the part of `residual` in the span of ∂F_p/∂θ into the coefficients
-/// of `prior`. `None` if the regression has no finite solution.
+/// Change of the coefficients of `prior`, in the coordinates of `basis`, by which they take over the part of `residual` in the
+/// span of ∂F_p/∂θ. `None` if the regression has no finite solution.
 pub(super) fn step(
     prior: &GreyBox,
     residual: &Residual,
@@ -50,7 +50,8 @@ pub(super) fn step(
 }
 
 impl Fit<'_> {
-    /// Regression row of sample `k`: the residual's state rates, and the derivatives of the prior's state rates.
+    /// Regression row of sample `k` of `track`: the residual's state rates, and the derivatives of the prior's state rates with
+    /// respect to the coordinates and the nuisance coefficients.
     fn sample(&self, prior: &GreyBox, residual: &Residual, track: &Track, k: usize) -> Row {
         let (state, controls) = (&track.states[k], &track.controls[k]);
         let scale = prior.scale();

@@ -1,4 +1,8 @@
-//! Settings of a model training: objective, parameters, length.
+//! Settings of the training of a dynamics model.
+//!
+//! The model's state rates are F_p + F_a. F_p is the prior, a physical model with coefficients. F_a is the residual, a
+//! neural network. A rollout simulates the model from a recorded state and is compared with the recorded flight. x_c is
+//! the scale of each state, eq. (21) of \[GSFM26\] (T. Guerin et al., 2026, see `src/lib.rs`), the paper.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,15 +13,14 @@ use greylag_model::GreyBox;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Criterion {
-    /// \[GSFM26\]: errors are scaled by x_c and divided by the error of the bare prior. The penalty is on
-    /// ‖F_a‖/‖F_p‖.
+    /// \[GSFM26\]: errors are divided by x_c, and their loss by the loss of the prior alone. The penalty is on ‖F_a‖/‖F_p‖.
     Scaled,
-    /// APHYNITY and PhIHP: x_c = 1, no divisor, and the penalty is on ‖F_a‖. PhIHP freezes the prior.
+    /// The published methods APHYNITY and PhIHP: errors and their loss are not scaled, and the penalty is on ‖F_a‖.
     Plain,
 }
 
 impl Criterion {
-    /// Scale of errors and rates.
+    /// Scale by which errors and rates of the eight states are divided.
     pub fn scale(self, model: &GreyBox) -> [f64; 8] {
         match self {
             Criterion::Scaled => model.scale(),
@@ -25,7 +28,7 @@ impl Criterion {
         }
     }
 
-    /// Penalty on the residual.
+    /// The penalty on the residual.
     pub fn penalty(self) -> Penalty {
         match self {
             Criterion::Scaled => Penalty::Ratio,
@@ -40,7 +43,7 @@ impl Criterion {
 pub enum Start {
     /// The values of the prior, as in the paper.
     AsGiven,
-    /// Estimates of a robust regression on short windows.
+    /// Estimates of a robust regression of the prior's state rates on short sections of the flights (equation error).
     EquationError,
 }
 
@@ -48,13 +51,13 @@ pub enum Start {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Joint {
-    /// By the gradient of the rollouts, at the learning rate [`Recipe::prior_rate`], as in the paper.
+    /// By the gradient of the loss over rollouts, with the learning rate [`Recipe::prior_rate`], as in the paper.
     #[default]
     Gradient,
-    /// By robust variable projection: the part of the residual in the span of the prior moves into the prior's
-    /// coefficients.
+    /// By variable projection with a robust regression: now and then, the part of F_a that a change of the coefficients can
+    /// produce moves into the coefficients.
     Projection,
-    /// By least-squares variable projection, to which training by the gradient converges.
+    /// By variable projection with an ordinary least-squares regression, to whose result training by the gradient converges.
     LeastSquares,
 }
 
@@ -64,7 +67,7 @@ impl Joint {
     }
 }
 
-/// All settings that determine the result, except data and prior.
+/// All settings of a training. Together with the data and the prior they determine the result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
@@ -77,29 +80,30 @@ pub struct Recipe {
     pub batch: usize,
     /// Total number of updates.
     pub updates: u64,
-    /// Initial learning rate. A cosine schedule reduces it to the fraction `rate_end`.
+    /// Initial learning rate. A cosine schedule reduces it to `rate_end` times this value.
     pub rate: f64,
-    /// Final fraction of the learning rate.
+    /// Ratio of the final to the initial learning rate.
     pub rate_end: f64,
-    /// Initial learning rate of the prior's coordinates; 0 freezes them. Training minimises the mean square of the
-    /// residual. An effect outside the prior's structure, for example stall, therefore biases the coordinates.
+    /// Initial learning rate of the prior's coefficients; 0 switches the gradient method off. The gradient method minimises
+    /// the mean square of F_a. An effect that the prior lacks, for example stall, therefore biases the coefficients.
     pub prior_rate: f64,
     /// Initial values of the trained coefficients.
     pub start: Start,
-    /// Method of training the prior's coefficients.
+    /// Method of training the prior's coefficients together with the residual.
     #[serde(default, skip_serializing_if = "Joint::is_gradient")]
     pub joint: Joint,
-    /// Initial value λ0 of λ in eq. (24).
+    /// Initial value λ0 of λ in eq. (24). The penalty on the residual is divided by λ.
     pub lambda: f64,
-    /// τ of eq. (24). λ grows by τ times the relative prediction loss in each update.
+    /// τ of eq. (24). In each update λ grows by τ times the prediction loss, which [`Criterion::Scaled`] divides by the loss of
+    /// the prior alone.
     pub tau: f64,
     /// Variant of the training objective.
     pub criterion: Criterion,
-    /// Weights each rollout by 1/(e² + floor²). Here e is the prior's error at the end of the rollout, relative to
-    /// the RMS over the rollouts. The residual then has the same relative accuracy where the prior's errors are small
-    /// and where they are large (stall). `None` weights all rollouts equally, as in the paper.
+    /// Weights each rollout by 1/(e² + floor²). Here e is the prior's error at the end of the rollout, divided by
+    /// the RMS of this error over all rollouts. The residual then has the same relative accuracy where the prior's errors are
+    /// small and where they are large (stall). `None` weights all rollouts equally, as in the paper.
     pub floor: Option<f64>,
-    /// Full names of the trained coefficients of the prior; empty for a frozen prior.
+    /// Full names of the trained coefficients of the prior. If the list is empty, the prior does not change.
     pub trainable: Vec<String>,
     /// Seed of the network's initial weights and of the minibatches.
     pub seed: u64,
@@ -155,13 +159,13 @@ impl Recipe {
         None
     }
 
-    /// Rollout length at an update.
+    /// Rollout length at the update with the number `update`, in steps.
     pub fn steps_at(&self, update: u64) -> usize {
         let place = update as u128 * self.steps.len() as u128 / u128::from(self.updates.max(1));
         self.steps[(place as usize).min(self.steps.len() - 1)]
     }
 
-    /// Learning-rate factor at an update.
+    /// Ratio of the learning rate at the update with the number `update` to the initial one.
     pub fn pace_at(&self, update: u64) -> f64 {
         let done = update as f64 / self.updates as f64;
         let cosine = 0.5 * (1.0 + (std::f64::consts::PI * done).cos());

@@ -1,8 +1,8 @@
 //! Resamples a flight with a longer sample time to the model's step.
 //!
-//! States are interpolated by cubics through four samples (Catmull–Rom), controls linearly. A reconstructed path is
-//! smooth. At 25 Hz, a cubic has an error of a few parts in a thousand. At 10 Hz, the fastest motions of a small
-//! aircraft cannot be reconstructed between the samples.
+//! States are interpolated by cubics from four samples (Catmull–Rom), controls linearly. This suits the smooth states of a
+//! flight-path reconstruction. At 25 Hz, the cubics have an error of a few parts in a thousand. At 10 Hz, the fastest motions
+//! of a small aircraft cannot be recovered between the samples.
 
 use greylag_model::STEP;
 use greylag_physics::{Controls, State};
@@ -13,8 +13,8 @@ pub const SLOWEST_S: f64 = 0.1;
 /// A sample: state, controls, altitude in m.
 pub type Row = (State, Controls, f64);
 
-/// `rows` with sample time `step_s` (s) resampled to [`STEP`], starting from the first row. Roll angles may wrap
-/// between rows.
+/// Resamples `rows` from the sample time `step_s` (s) to [`STEP`], starting at the first row. Roll angles may wrap between
+/// rows.
 pub fn resampled(rows: &[Row], step_s: f64) -> Vec<Row> {
     if rows.len() < 2 {
         return rows.to_vec();
@@ -24,7 +24,7 @@ pub fn resampled(rows: &[Row], step_s: f64) -> Vec<Row> {
     (0..count).map(|k| at(rows, k as f64 * STEP / step_s)).collect()
 }
 
-/// The interpolated row at `place`, in samples from the first.
+/// The row at the time `place`, in sample times after the first row, by interpolation.
 fn at(rows: &[Row], place: f64) -> Row {
     let last = rows.len() - 1;
     let k = (place as usize).min(last - 1);
@@ -63,7 +63,7 @@ mod tests {
         (state, Controls { aileron: 0.1 * time, ..Controls::default() }, 600.0 + time)
     }
 
-    /// A motion of 5 rad/s, twice the short period of a small aircraft, sampled at 25 Hz.
+    /// A sinusoidal motion with the angular frequency 5 rad/s, sampled at 25 Hz.
     #[test]
     fn a_smooth_motion_is_found_between_the_samples() {
         let rows: Vec<Row> = (0..100).map(|k| row(0.04 * k as f64)).collect();

@@ -1,5 +1,8 @@
-//! Map of the learned residual: channels, regimes and magnitudes. F_a are the state rates of the residual, F_p those
-//! of the prior, and x_c is the reference scale of the state.
+//! Map of the learned residual: its magnitude in each channel and in each flight condition.
+//!
+//! The residual is the network that adds state rates F_a to the rates F_p of the physical effects (the prior). x_c is the
+//! reference scale of the state, eq. (21) of \[GSFM26\] (T. Guerin et al., 2026). A channel is one of the eight state rates. A
+//! regime variable describes the flight condition: angle of attack, sideslip or airspeed.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -8,7 +11,7 @@ use crate::dynamics::windows::{Track, regular};
 use greylag_model::GreyBox;
 use greylag_physics::State;
 
-/// Names of the state's rates, in the order of [`State::to_array`].
+/// Names of the channels, in the order of [`State::to_array`].
 pub const CHANNELS: [&str; 8] = ["roll", "pitch", "airspeed", "p", "q", "r", "alpha", "beta"];
 
 /// Number of bins of a regime variable.
@@ -17,16 +20,16 @@ const BINS: usize = 10;
 /// Smallest number of samples in a bin. Bins with fewer samples are omitted.
 const SUPPORT: usize = 20;
 
-/// Statistics of a residual over recorded flights.
+/// Statistics of a residual at the states of recorded flights.
 #[derive(Clone, Debug, Serialize)]
 pub struct ResidualMap {
-    /// ‖F_a‖/‖F_p‖ over all samples, eq. (22).
+    /// Root mean square of ‖F_a/x_c‖ over all samples, divided by that of ‖F_p/x_c‖, eq. (22).
     pub ratio: f64,
-    /// Residual of each channel.
+    /// Magnitude of each channel's residual.
     pub channels: Vec<Share>,
-    /// The mean of each channel's F_a/x_c (1/s) over a regime variable.
+    /// Each channel's F_a/x_c (1/s) over each regime variable.
     pub curves: Vec<Curve>,
-    /// RMS of ‖F_a/x_c‖ (1/s) over α and β.
+    /// Root mean square of ‖F_a/x_c‖ (1/s) in cells of angle of attack and sideslip.
     pub map: Vec<Cell>,
 }
 
@@ -39,8 +42,8 @@ pub struct Share {
     pub prior: f64,
     /// Root mean square of F_a/x_c, 1/s.
     pub learned: f64,
-    /// Regime variable and edges (degrees, m/s) of the bin with the largest residual relative to the other bins of
-    /// this variable. `None` if no bin has enough samples.
+    /// Name and edges (degrees, m/s) of the bin in which the residual is largest relative to the mean over the bins of its
+    /// regime variable. `None` if no bin has enough samples.
     pub strongest: Option<(&'static str, [f64; 2])>,
 }
 
@@ -49,20 +52,21 @@ pub struct Share {
 pub struct Curve {
     /// Name of the channel.
     pub channel: &'static str,
-    /// Name of the variable.
+    /// Name of the regime variable.
     pub over: &'static str,
-    /// For each bin: centre (degrees, m/s), mean and RMS of F_a/x_c (1/s). Bins of fewer than 20 samples are omitted.
+    /// For each bin: centre (degrees, m/s), mean and root mean square of F_a/x_c (1/s). Bins of fewer than 20 samples are
+    /// omitted.
     pub points: Vec<[f64; 3]>,
 }
 
-/// A cell of the map over flow angles.
+/// A cell of the map over angle of attack and sideslip.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Cell {
     /// Angle of attack at the centre, degrees.
     pub alpha_deg: f64,
     /// Angle of sideslip at the centre, degrees.
     pub beta_deg: f64,
-    /// RMS of ‖F_a/x_c‖ in the cell, 1/s.
+    /// Root mean square of ‖F_a/x_c‖ in the cell, 1/s.
     pub norm: f64,
     /// Number of samples in the cell.
     pub samples: usize,
@@ -79,10 +83,10 @@ fn regime(state: &State) -> [f64; 3] {
     [state.alpha.to_degrees(), state.beta.to_degrees(), state.airspeed]
 }
 
-/// A sample: its regime, F_p/x_c and F_a/x_c.
+/// A sample: the values of the regime variables, F_p/x_c and F_a/x_c.
 type Row = ([f64; 3], [f64; 8], [f64; 8]);
 
-/// The residual map of `model` over `tracks`; `None` if `model` has no residual or there is no usable sample.
+/// The residual map of `model` at the states of `tracks`; `None` if `model` has no residual or no state is usable.
 pub fn residual_map(model: &GreyBox, tracks: &[Track]) -> Option<ResidualMap> {
     let residual = model.residual.as_ref()?;
     let mut bare = model.clone();
@@ -123,7 +127,7 @@ pub fn residual_map(model: &GreyBox, tracks: &[Track]) -> Option<ResidualMap> {
     })
 }
 
-/// The bin of `x` between the edges of a regime variable; `None` outside the edges.
+/// The bin of `x`, a value of the regime variable with the range `low` to `high`; `None` outside the range.
 fn bin(x: f64, [low, high]: [f64; 2]) -> Option<usize> {
     let place = (x - low) / (high - low) * BINS as f64;
     (place >= 0.0 && place < BINS as f64).then_some(place as usize)
@@ -154,7 +158,7 @@ fn curve(rows: &[Row], channel: usize, variable: usize) -> Curve {
     Curve { channel: CHANNELS[channel], over, points }
 }
 
-/// The variable and the edges of the bin whose RMS residual is largest relative to the mean over the variable's bins.
+/// Name and edges of the bin whose root mean square is largest relative to the mean over the bins of its regime variable.
 fn strongest(curves: &[Curve]) -> Option<(&'static str, [f64; 2])> {
     let mut best: Option<(f64, &str, [f64; 2])> = None;
     for (curve, (over, [low, high])) in curves.iter().zip(REGIMES) {

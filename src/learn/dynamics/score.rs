@@ -1,33 +1,34 @@
-//! Free-run errors of a model over recorded tracks as a function of the horizon.
+//! Errors of a model in free runs (open-loop simulations) along recorded flights, as a function of the horizon. The horizon is
+//! the length of a run. A track is a section of a flight without gaps.
 
 use rayon::prelude::*;
 
 use crate::dynamics::windows::{Track, Window, windows};
 use greylag_model::{GreyBox, Memory};
 
-/// Interval between the starts of two runs, steps.
+/// Interval between the starts of consecutive runs along a track, steps of 10 ms.
 const EVERY: usize = 50;
 
-/// Largest scaled error of a run. A run with this error counts as diverged.
+/// Limit of the error of a run, which is relative to the scale x_c of the states. A run at the limit counts as diverged.
 const BOUND: f64 = 1.0;
 
 /// The error at one horizon.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Horizon {
-    /// Horizon in steps.
+    /// Horizon in steps of 10 ms.
     pub steps: usize,
     /// Number of runs that reach this horizon.
     pub runs: usize,
-    /// RMS error over the runs. The error of a run is the RMS over the states of (ŝ − s)/x_c, limited to 1. Here ŝ is
-    /// the predicted and s the recorded state.
+    /// RMS over the runs of the error at the end of a run. This error is the RMS over the eight states of (ŝ − s)/x_c, limited to
+    /// 1. Here ŝ is the predicted state, s the recorded state and x_c the characteristic scale of the states, eq. (21).
     pub rms: f64,
-    /// Median error over the runs.
+    /// Median over the runs of the same error.
     pub median: f64,
-    /// Fraction of the runs whose error reached the limit of 1.
+    /// Fraction of the runs whose error reaches the limit of 1.
     pub lost: f64,
 }
 
-/// Errors of `model` in free runs over `tracks` with the recorded inputs, after each of `horizons` steps.
+/// Errors of `model` in free runs along `tracks` with the recorded inputs, for each of `horizons` (steps).
 pub fn free_run(model: &GreyBox, tracks: &[Track], horizons: &[usize]) -> Vec<Horizon> {
     horizons.iter().map(|steps| horizon(model, tracks, *steps)).collect()
 }
@@ -50,7 +51,7 @@ fn horizon(model: &GreyBox, tracks: &[Track], steps: usize) -> Horizon {
     }
 }
 
-/// The error of one run after `steps` steps from `window` on: the root mean square over the states of (ŝ − s)/x_c,
+/// The error of one run of `steps` steps from the start of `window`: the root mean square over the states of (ŝ − s)/x_c,
 /// limited to 1.
 pub(crate) fn off_after(model: &GreyBox, tracks: &[Track], window: &Window, steps: usize) -> f64 {
     let (track, start) = (&tracks[window.track as usize], window.start as usize);
@@ -58,7 +59,7 @@ pub(crate) fn off_after(model: &GreyBox, tracks: &[Track], window: &Window, step
     let advance = |k: usize, state, memory: &mut Memory| {
         model.step(&state, &track.controls[k], track.altitude[k], memory)
     };
-    // the integrator needs the memory of the step before the start
+    // the integrator needs the acceleration of the step before the start
     advance(start - 1, track.states[start - 1], &mut memory);
     let mut state = track.states[start];
     for k in start..start + steps {

@@ -1,4 +1,7 @@
-//! Training of the dynamics model, section IV-A of \[GSFM26\].
+//! Training of a dynamics model, section IV-A of \[GSFM26\] (T. Guerin et al., 2026, see `src/lib.rs`).
+//!
+//! The model is a prior, a physical model with coefficients, plus a residual, a neural network. A rollout simulates the
+//! model from a recorded state and is compared with the recorded flight. [`Recipe`] has the settings.
 
 mod reports;
 mod stage;
@@ -24,15 +27,17 @@ use greylag_model::{GreyBox, Residual};
 use greylag_num::{Dense, stream};
 use stage::Stage;
 
-/// Largest number of samples from which the envelope of the training data is computed.
+/// Largest number of samples that describe the range of the training data. The trained residual reports how far an input is
+/// from this range.
 const ENVELOPE_SAMPLES: usize = 40_000;
 
-/// Consecutive failed updates after which the training ends with [`TrainError::Diverged`].
+/// Largest number of consecutive failed updates. One more ends the training with [`TrainError::Diverged`].
 const PATIENCE: u64 = 20;
 
-/// Interval between projections, updates.
+/// Number of updates between two projections. A projection moves the part of the residual that the prior can represent into
+/// the prior's coefficients.
 const PROJECT_EVERY: u64 = 500;
-/// Fraction of the updates after which projections end. The residual then adapts to the final coefficients.
+/// Fraction of all updates up to which projections are made. After that the residual adapts to the final coefficients.
 const PROJECT_UNTIL: f64 = 0.75;
 
 /// Id of the random stream for the initial weights of the network.
@@ -49,12 +54,12 @@ pub struct Trainer {
     basis: Basis,
     subject: Subject,
     engine: Engine,
-    /// Coordinates η of the prior.
+    /// Coordinates η of the prior's coefficients, see [`Basis`].
     coordinates: Vec<f64>,
     adam: Adam,
     lambda: f64,
     update: u64,
-    /// Rollouts of the present length, in the order of the present epoch.
+    /// Sections of the flights for rollouts of the present length.
     stage: Stage,
 }
 
@@ -76,7 +81,7 @@ impl Trainer {
         let sizes: Vec<usize> =
             [INPUTS].into_iter().chain(recipe.hidden.iter().copied()).chain([OUTPUTS]).collect();
         let network = Dense::silent(&sizes, &mut stream::stream(recipe.seed, &[START]))?;
-        // layer sizes that are invalid for a residual must be rejected here, not when the trained model is created
+        // invalid layer sizes are found here instead of after the training
         Residual::new(network.clone(), &prior.airframe, prior.scale())?;
         let mut subject = Subject {
             scales: Scales::new(&prior.airframe, prior.scale()),
@@ -92,9 +97,8 @@ impl Trainer {
         let arithmetic = Arithmetic::Lanes;
         let engine = Engine::new(&subject, recipe.batch, longest, arithmetic);
         let count = subject.network.network().parameters().len();
-        // The residual learns the error of the prior with these initial coefficients. This error may be much smaller
-        // than that of the prior as given. If the larger error were the divisor, the whole prediction loss would be
-        // smaller than the penalty.
+        // The prediction loss is divided by the loss of the prior with these initial coefficients. The loss of the prior
+        // as given may be much larger. With it as the divisor, the prediction loss would be negligible beside the penalty.
         basis.apply(&mut subject.prior, &coordinates);
         let begun = subject.prior.clone();
         let stage = Stage::new(&subject, &recipe, &tracks, recipe.steps_at(0))?;
@@ -143,7 +147,7 @@ impl Trainer {
         }
     }
 
-    /// Hash of everything that determines the result.
+    /// Hash of the recipe, the prior, its airframe and the data, which determine the result.
     fn identity(&self) -> String {
         let recipe = serde_json::to_string(&self.recipe).unwrap_or_default();
         let prior = format!(
@@ -154,7 +158,7 @@ impl Trainer {
             self.prior.axes
         );
         let airframe = fingerprint(&self.prior.airframe);
-        // the identity of a prior without tables and effect files is the same as in earlier versions of the program
+        // a prior without tables and effect files adds nothing here, so its identity is that of earlier program versions
         let tables: String =
             self.prior.tables().map(|(id, table)| format!(" {id} {table:?}")).collect();
         let grid = self.prior.thrust_grid().map(|grid| format!(" {grid:?}")).unwrap_or_default();
@@ -176,7 +180,7 @@ impl Trainer {
         self.update >= self.recipe.updates
     }
 
-    /// SHA-256 of the data, hexadecimal.
+    /// SHA-256 of the flights, hexadecimal.
     pub fn data(&self) -> &str {
         &self.data
     }
@@ -186,7 +190,7 @@ impl Trainer {
         &self.recipe
     }
 
-    /// Names of the coefficients that the data does not identify. They stay constant.
+    /// Names of the coefficients that the data cannot determine, or cannot separate from other coefficients.
     pub fn unseen(&self) -> &[String] {
         &self.basis.unseen
     }
@@ -231,7 +235,7 @@ impl Trainer {
         Ok(model)
     }
 
-    /// Makes up to `count` updates and returns their mean progress.
+    /// Makes up to `count` updates and returns their progress: the number of updates so far and mean losses.
     ///
     /// # Errors
     ///
@@ -274,7 +278,7 @@ impl Trainer {
         })
     }
 
-    /// If a projection is due, moves the part of the residual in the span of the prior into the prior's coefficients.
+    /// If a projection is due, moves the part of the residual that the prior can represent into the prior's coefficients.
     fn project(&mut self) -> Result<(), TrainError> {
         let weighting = match self.recipe.joint {
             Joint::Gradient => return Ok(()),
@@ -297,8 +301,8 @@ impl Trainer {
         Ok(())
     }
 
-    /// Makes one update. Returns the loss and the relative prediction loss L_pred/L_prior; `None` if the gradient is
-    /// not finite or more than half of the rollouts are lost.
+    /// Makes one update. Returns the loss and the ratio L_pred/L_prior of the model's prediction loss to that of the prior.
+    /// Returns `None` and changes no parameter if the gradient is not finite or more than half of the rollouts diverge.
     fn one(&mut self) -> Result<Option<(Loss, f64)>, TrainError> {
         let steps = self.recipe.steps_at(self.update);
         if steps != self.stage.steps {

@@ -1,4 +1,5 @@
-//! Recorded flights as training data: tracks of states and controls, cut into windows.
+//! Recorded flights as training data: tracks of states and controls, cut into windows. A window is the stretch of a track over
+//! which a rollout (simulation) is compared with the record.
 
 use sha2::{Digest, Sha256};
 
@@ -12,9 +13,10 @@ use greylag_physics::{Controls, State};
 /// A section of flight without gaps, with a sample every 0.01 s.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Track {
-    /// States at each sample.
+    /// State at each sample.
     pub states: Vec<State>,
-    /// Deflections and throttle that act from each sample to the next, after the model's input effects.
+    /// Deflections and throttle that act on the aircraft from each sample to the next: those measured, changed by the model's
+    /// input effects, such as backlash.
     pub controls: Vec<Controls>,
     /// Altitude at each sample, m.
     pub altitude: Vec<f64>,
@@ -23,8 +25,8 @@ pub struct Track {
 }
 
 impl Track {
-    /// A track of `samples` (state, measured controls, altitude in m). The acting controls and the air density follow
-    /// from `model`.
+    /// Makes a track from `samples` (state, measured controls, altitude in m). The acting controls and the air density are
+    /// computed with `model`.
     pub fn new(model: &GreyBox, samples: impl Iterator<Item = (State, Controls, f64)>) -> Track {
         let mut track = Track::default();
         let mut memory: Option<InputMemory> = None;
@@ -65,7 +67,8 @@ impl Track {
         [part(0..at), part(at..self.states.len())]
     }
 
-    /// Possible starts of rollouts of `steps` steps. A start has one sample before it and `steps` samples after it.
+    /// Indices of the samples at which a rollout of `steps` steps can start. Such a sample has one sample before it and `steps`
+    /// samples after it.
     pub fn starts(&self, steps: usize) -> std::ops::Range<usize> {
         1..self.states.len().saturating_sub(steps).max(1)
     }
@@ -82,8 +85,7 @@ pub struct Window {
     pub weight: f64,
 }
 
-/// Samples are used for training only if the magnitude of pitch is below this, rad. Euler angles are singular near
-/// the vertical.
+/// Largest |pitch| of samples for training, rad. Euler angles are singular near the vertical.
 const STEEPEST: f64 = 1.4;
 /// Airspeed below which flow angles are undefined, m/s.
 const SLOWEST: f64 = 5.0;
@@ -93,11 +95,12 @@ pub(crate) fn regular(state: &State) -> bool {
     state.is_finite() && state.pitch.abs() < STEEPEST && state.airspeed > SLOWEST
 }
 
-/// All windows of `steps` steps, in order, in which every sample is regular (not near the vertical, fast enough).
+/// All windows of `steps` steps, in order, whose samples are all usable (finite, not near the vertical, fast enough). This
+/// includes the sample before the start.
 pub fn windows(tracks: &[Track], steps: usize) -> Vec<Window> {
     let mut all = Vec::new();
     for (track, t) in tracks.iter().enumerate() {
-        // number of consecutive regular samples up to each sample
+        // for each sample, the number of consecutive regular samples that end with it
         let mut run = 0;
         let runs: Vec<usize> = t
             .states
@@ -137,8 +140,8 @@ pub fn hash(tracks: &[Track]) -> String {
 }
 
 impl<R: Packet> Recorded<R> {
-    /// Loads the windows of a block, each `steps` long. Lanes beyond `windows` repeat the first window with weight
-    /// zero.
+    /// Loads the recorded samples of the windows, one window per lane, for rollouts of `steps` steps. Lanes beyond `windows`
+    /// repeat the first window with weight zero.
     ///
     /// # Panics
     ///

@@ -2,7 +2,7 @@
 //!
 //! This is the short-horizon actor-critic of Xu et al. (2022) without its critic. The windows are longer than the
 //! response time of the aircraft, so the rewards after a window matter little. The model's derivatives are finite
-//! differences between the lanes of one block. The first lane holds the point itself, and each other lane has one
+//! differences between the lanes of SIMD vectors. The first lane holds the point itself, and each other lane has one
 //! perturbed variable. The actuator states are reconstructed from the five observed values and the last commands. The
 //! reconstruction is exact except for the first step after an actuator leaves a stop.
 
@@ -36,8 +36,8 @@ pub struct AnalyticRecipe {
     pub updates: u64,
     /// Initial learning rate. A cosine schedule reduces it to a hundredth.
     pub rate: f64,
-    /// The reward is smoothed if the error of roll or pitch (rad) or of airspeed (m/s) is below this. The reward as
-    /// given is not differentiable at zero error.
+    /// Error of roll or pitch (rad) or airspeed (m/s) below which the reward is smoothed. Without smoothing the reward
+    /// is not differentiable at zero error.
     pub rounding: f64,
     /// Weight (≥ 0) of the squared change of the aileron and elevator commands per step in the objective. Commands
     /// range from −1 to 1.
@@ -90,14 +90,14 @@ pub struct AnalyticProgress {
     pub update: u64,
     /// Mean reward per step in the window of this update.
     pub reward: f64,
-    /// Number of episodes so far in which the aircraft left the validity limits.
+    /// Number of episodes so far that ended early because the state of the aircraft became implausible.
     pub lost: u64,
 }
 
 /// State of a training.
 pub struct AnalyticTrainer {
     recipe: AnalyticRecipe,
-    /// The models. The aircraft are assigned to them in turn.
+    /// The models to which the aircraft are assigned in turn.
     models: Vec<GreyBox>,
     device: Device,
     actor: Mlp,
@@ -159,7 +159,7 @@ impl AnalyticTrainer {
         })
     }
 
-    /// This training with the weights of `actor`, whose layers must be those of the recipe.
+    /// Starts this training from the weights of `actor`, whose layers must be those of the recipe.
     ///
     /// # Errors
     ///
@@ -245,7 +245,7 @@ impl AnalyticTrainer {
         false
     }
 
-    /// Backward pass: the derivative of the sum of rewards with respect to every action.
+    /// Backward pass: the derivative of the sum of rewards with respect to every action, in the order of `steps`.
     fn reverse(&self, seen: &[[f32; OBSERVATIONS]], steps: &[Option<Step>]) -> Vec<f32> {
         let count = self.instances.len();
         let actor = self.actor.passed();
@@ -286,7 +286,7 @@ impl AnalyticTrainer {
         slopes
     }
 
-    /// Updates the actor by gradient ascent on the reward.
+    /// Updates the actor by gradient ascent on the reward. `slopes` are the derivatives from `reverse`.
     fn climb(&mut self, seen: &[[f32; OBSERVATIONS]], slopes: &[f32]) {
         let followed = self.actor.followed();
         let rows = self.rows(seen.as_flattened(), OBSERVATIONS).autodiff();

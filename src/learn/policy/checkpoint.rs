@@ -1,4 +1,4 @@
-//! The checkpoint of a policy training, in a file that is replaced atomically.
+//! The checkpoint of a policy training with TD3 (twin delayed policy gradient), in a file that is replaced atomically.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -59,7 +59,8 @@ impl PolicyStanding {
     }
 }
 
-/// Arrays of the training state `standing`, each with its name in the file.
+/// The arrays of the training state `standing`, each with its name in the file: the replay buffer, and the parameters and
+/// the optimiser's moments of each network.
 fn lists(standing: &PolicyStanding) -> Vec<(String, &[f32])> {
     let mut lists = vec![("replay".to_owned(), &standing.replay[..])];
     for (name, (own, target, moments)) in NAMES.iter().zip(&standing.td3.networks) {

@@ -1,10 +1,10 @@
 //! Twin critics of a fixed actor, learned from the returns of its simulated flights.
 //!
-//! A search uses the critics and evaluates states that the actor would not reach. Therefore each flight starts with
-//! random actions for some steps. Then the actor flies. The value of a state on the flight path is the return of the
-//! rewards from there to the end of the window, plus the critic's discounted value of the last state: TD(1) over a
-//! window, eq. (11) of \[GSFM26\] for a fixed actor. The loss is relative to the return, because returns are small
-//! near the target and a search must resolve small differences there.
+//! A planner uses the critics, also in states that the actor alone would not reach. Therefore each flight starts with
+//! random actions for some steps. Then the actor flies for a fixed number of steps, the window. The value of a state is
+//! the discounted sum of the rewards from there to the end of the window (the return), plus the critic's discounted value
+//! of the last state. This is TD(1) over a window, eq. (11) of \[GSFM26\] for a fixed actor. The loss uses errors relative
+//! to the return, because returns are small near the target and a planner must resolve small differences there.
 
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::RngExt as _;
@@ -25,13 +25,14 @@ const START: u64 = 40;
 const FLY: u64 = 41;
 const UPDATE: u64 = 42;
 
-/// Inputs of a critic.
+/// Number of inputs of a critic.
 const INPUTS: usize = OBSERVATIONS + ACTIONS;
 /// Number of values stored per step: a critic's inputs, the return over the rest of the window, the discount of the
 /// value at the end of the window, and a critic's inputs at that end.
 const ROW: usize = INPUTS + 2 + INPUTS;
 
-/// Return well below which errors count as absolute instead of relative, in units of the reward of eq. (30).
+/// The loss divides each error by the magnitude of the return plus this value, in units of the reward of eq. (30). For much
+/// smaller returns the errors therefore count as absolute errors.
 const SMALL: f32 = 0.1;
 
 /// Settings of the training of critics.
@@ -47,9 +48,9 @@ pub struct ValuationRecipe {
     pub rate: f64,
     /// Number of simulated aircraft.
     pub instances: usize,
-    /// Largest number of steps with random actions before the actor flies.
+    /// Largest number of steps with random actions before a window.
     pub burst: u64,
-    /// Number of steps that the actor flies.
+    /// Number of steps of a window. The first action of a window is random, the others are the actor's.
     pub window: usize,
     /// Number of windows after which all episodes restart with other targets.
     pub windows: u64,
@@ -82,7 +83,7 @@ impl Default for ValuationRecipe {
     }
 }
 
-/// Critics cannot be learned.
+/// Reason why critics cannot be learned.
 #[derive(Debug, thiserror::Error)]
 pub enum ValuationError {
     /// The loss is not finite.
@@ -99,14 +100,14 @@ pub enum ValuationError {
     World(#[from] Trouble),
 }
 
-/// Progress since the last query.
+/// Progress of the training after a call of [`Valuation::run`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ValuationProgress {
     /// Number of updates made.
     pub updates: u64,
-    /// RMS relative error of the critics' values.
+    /// RMS relative error of the critics' values, over the updates of this call.
     pub error: f64,
-    /// Number of steps flown.
+    /// Number of steps flown so far, summed over all aircraft.
     pub steps: u64,
 }
 
@@ -248,7 +249,7 @@ impl<W: World> Valuation<W> {
         let worst = -(task.roll_cap + task.pitch_cap + task.airspeed_cap) as f32;
         let of = |numbers: &[Block; INPUTS]| numbers.map(|x| x.0[lane]);
         let (mut earned, mut weight, mut end) = (0.0, 1.0, of(beyond));
-        // the value after a time limit is unknown: the steps before it are not stored
+        // the value at the time limit of an episode is unknown: the steps before it are not stored
         let mut known = true;
         for (at, stepped) in way.iter().rev() {
             match stepped.ended[lane] {
@@ -337,7 +338,7 @@ fn inputs(observed: &[Block; OBSERVATIONS], action: &[Block; ACTIONS]) -> [Block
     all
 }
 
-/// Random actions from −1 to 1.
+/// Random actions between −1 and 1.
 fn random(rng: &mut Stream) -> [Block; ACTIONS] {
     let mut action = [Block::zero(); ACTIONS];
     action.iter_mut().flat_map(|a| &mut a.0).for_each(|a| *a = rng.random_range(-1.0..1.0));

@@ -1,4 +1,8 @@
 //! The learning curve of a policy: evaluations in its training environment, as a table on disk.
+//!
+//! An evaluation flies the policy to commanded attitudes, which are easy or hard targets by their size (Table II of \[GSFM26\],
+//! T. Guerin et al., 2026). The settled error of a target is the mean of the RMSE in roll and in pitch at the end of the
+//! flight.
 
 use std::fs::File;
 use std::io::Write as _;
@@ -11,20 +15,20 @@ use greylag_num::statistics::{interquartile_mean, quantile};
 
 /// File name of a curve.
 pub const CURVE: &str = "curve.csv";
-/// Column names.
+/// Names of the columns, in the order of [`CurvePoint::line`].
 pub const COLUMNS: &str =
     "steps,updates,seconds,easy_deg,hard_deg,divergence_rate,loss,reward,episodes,lost";
 /// At the knee of a curve, this fraction of the reduction from the first to the smallest error is reached.
 const KNEE: f64 = 0.9;
 
-/// One evaluation. Values that were not measured are NaN.
+/// One evaluation, with the progress of the training. Values that were not measured are NaN.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CurvePoint {
     /// Number of environment steps so far, all aircraft together.
     pub steps: u64,
     /// Number of updates so far.
     pub updates: u64,
-    /// Time so far, over all sessions, s.
+    /// Computing time so far, over all processes that continued this training, s.
     pub seconds: f64,
     /// Mean settled error on easy targets, degrees.
     pub easy_deg: f64,
@@ -34,7 +38,7 @@ pub struct CurvePoint {
     pub divergence_rate: f64,
     /// Mean loss of the critics.
     pub loss: f64,
-    /// Mean reward per training step. For TD3, it is `PolicyProgress::reward`.
+    /// Mean reward per training step. For TD3 it is `PolicyProgress::reward`.
     pub reward: f64,
     /// Number of episodes started.
     pub episodes: u64,
@@ -60,8 +64,8 @@ impl CurvePoint {
         )
     }
 
-    /// Sum of the errors on easy and hard targets, degrees. Without an evaluation, the negative reward; infinite
-    /// without either. The best point has the smallest value.
+    /// Sum of the mean settled errors on easy and hard targets, degrees. If the targets were not flown, the negative reward;
+    /// infinite without either. The best point has the smallest value.
     pub fn badness(&self) -> f64 {
         let error = self.easy_deg + self.hard_deg;
         match (error.is_nan(), self.reward.is_nan()) {
@@ -102,15 +106,15 @@ pub fn best(points: &[CurvePoint]) -> Option<usize> {
     (0..points.len()).rev().min_by(|a, b| points[*a].badness().total_cmp(&points[*b].badness()))
 }
 
-/// The knee of the curve: the first point at which nine tenths of the reduction from the first to the smallest error
-/// are reached. `None` without points.
+/// The knee of the curve: the first point at which nine tenths of the reduction from the first to the smallest value of
+/// [`CurvePoint::badness`] are reached. `None` without points.
 pub fn knee(points: &[CurvePoint]) -> Option<&CurvePoint> {
     let (first, best) = (points.first()?.badness(), points[best(points)?].badness());
     points.iter().find(|p| p.badness() <= first - KNEE * (first - best))
 }
 
-/// Spread of a quantity over several curves, one for each seed: interquartile mean (Agarwal et al. 2021), smallest
-/// and largest value.
+/// Spread of a quantity over several curves, one for each seed: interquartile mean (Agarwal et al. 2021), smallest and largest
+/// value. Each list has one value for each abscissa.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Spread {
     /// Interquartile mean over the seeds.
@@ -121,8 +125,8 @@ pub struct Spread {
     pub high: Vec<f64>,
 }
 
-/// The spread over `curves` of the quantity `get`, at the values `at` of the quantity `over`. Each curve is
-/// interpolated linearly. The spread is NaN where any curve has not begun or has ended.
+/// The spread over `curves` of the quantity that `get` returns, at the abscissae `at`. `over` returns the abscissa of a point,
+/// for example its time. Each curve is interpolated linearly. The spread is NaN where any curve has not begun or has ended.
 pub fn spread(
     curves: &[&[CurvePoint]],
     over: impl Fn(&CurvePoint) -> f64,
@@ -177,7 +181,7 @@ impl CurveFile {
         Ok(CurveFile { file: File::options().append(true).open(path)?, points })
     }
 
-    /// Points of the curve.
+    /// Points of the curve so far.
     pub fn points(&self) -> &[CurvePoint] {
         &self.points
     }
@@ -187,12 +191,12 @@ impl CurveFile {
         best(&self.points).map_or(f64::INFINITY, |i| self.points[i].badness())
     }
 
-    /// Time of the earlier sessions, s.
+    /// Computing time up to the last point, s. Zero without points.
     pub fn seconds(&self) -> f64 {
         self.points.last().map_or(0.0, |p| p.seconds)
     }
 
-    /// Appends a point.
+    /// Appends `point` to the curve and to its file.
     ///
     /// # Errors
     ///
@@ -297,7 +301,7 @@ mod tests {
         assert_eq!(spread.middle[..3], [6.0, 4.5, 3.0]);
         assert_eq!((spread.low[1], spread.high[1]), (3.0, 6.0));
         assert!(spread.middle[3].is_nan());
-        // a curve without points
+        // a curve without points has no value
         let empty = super::spread(&[&[]], |p| p.seconds, |p| p.easy_deg, &[0.0]);
         assert!(empty.middle[0].is_nan());
     }

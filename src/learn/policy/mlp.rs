@@ -1,4 +1,4 @@
-//! A dense network in burn, with its optimiser.
+//! A dense network in the deep-learning framework burn, with its optimiser Adam.
 
 use burn::tensor::{Device, Gradients, Tensor, TensorData, activation};
 
@@ -12,11 +12,11 @@ pub struct Mlp {
     layers: Vec<(Tensor<2>, Tensor<1>)>,
 }
 
-/// Adam for one network, in one pass over each of its tensors.
+/// The optimiser Adam for one network. It updates each tensor in a single pass.
 ///
-/// burn's Adam makes a dozen passes, each with a new allocation. At the layer sizes of Table VII of \[GSFM26\], they
-/// take a tenth of the time of a TD3 update. This code uses burn's operations in burn's order. A test checks that the
-/// results are equal to the bit.
+/// burn's Adam makes a dozen passes over each tensor, each with a new allocation. At the layer sizes of Table VII of \[GSFM26\],
+/// these passes take a tenth of the time of a TD3 update. This code uses burn's operations in burn's order. A test checks that
+/// the results are equal to the bit.
 #[derive(Clone, Debug)]
 pub struct Optimiser {
     rate: f64,
@@ -25,14 +25,14 @@ pub struct Optimiser {
     layers: Vec<[Moment; 2]>,
 }
 
-/// Running means of a tensor's gradient and of its square.
+/// Running means of a tensor's gradient and of the gradient's square.
 #[derive(Clone, Debug)]
 struct Moment {
     mean: Vec<f32>,
     square: Vec<f32>,
 }
 
-/// Constants of a step, common to all parameters.
+/// Values for one step that are the same for all parameters.
 struct Pace {
     rate: f32,
     /// Bias correction of the mean divided by the bias correction of the root mean square.
@@ -43,7 +43,8 @@ struct Pace {
 const BETA: [f32; 2] = [0.9, 0.999];
 const EPSILON: f32 = 1e-8;
 
-/// State of an optimiser: its steps, then first and second moments in the order of a network's parameters.
+/// State of an optimiser: number of steps, first moments and second moments. The moments are in the order of the network's
+/// parameters.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Moments {
     /// Number of steps made.
@@ -55,7 +56,7 @@ pub struct Moments {
 }
 
 impl Mlp {
-    /// The tensors of `network`, without gradients.
+    /// Copies `network` into tensors on `device`. Their gradients are not tracked.
     pub fn new(network: &Dense, device: &Device) -> Mlp {
         let sizes = network.sizes();
         let layers = network.layers().zip(sizes.windows(2)).map(|(layer, s)| {
@@ -107,7 +108,7 @@ impl Mlp {
         Mlp { sizes: self.sizes.clone(), layers: self.layers.iter().map(follow).collect() }
     }
 
-    /// A copy that passes gradients through without tracking its parameters.
+    /// A copy through which gradients pass to its inputs, but whose parameters' gradients are not tracked.
     pub fn passed(&self) -> Mlp {
         let pass = |(w, b): &(Tensor<2>, Tensor<1>)| (w.clone().autodiff(), b.clone().autodiff());
         Mlp { sizes: self.sizes.clone(), layers: self.layers.iter().map(pass).collect() }
@@ -128,7 +129,8 @@ impl Mlp {
     }
 }
 
-/// `tensor` after `change` has updated its numbers from those of `other`, which has the same shape.
+/// Returns `tensor` after `change` has updated its numbers. `change` gets them together with the numbers of `other`, which has
+/// the same shape.
 fn changed<const D: usize>(
     tensor: Tensor<D>,
     other: Tensor<D>,
@@ -157,8 +159,8 @@ impl Optimiser {
         Optimiser { rate, steps: 0, layers: layers.collect() }
     }
 
-    /// Updates `network` by one step. `gradients` are those of the parameters of `followed`, its copy with tracked
-    /// gradients.
+    /// Updates `network` by one step. `followed` is the copy of `network` with tracked gradients; `gradients` holds the
+    /// gradients of its parameters.
     pub fn step(&mut self, network: &mut Mlp, followed: Mlp, gradients: &mut Gradients) {
         self.steps += 1;
         let pace = Pace::of(self.steps, self.rate);
@@ -182,7 +184,7 @@ impl Optimiser {
         self.rate = rate;
     }
 
-    /// The present moments.
+    /// The present state of the optimiser.
     pub fn moments(&self) -> Moments {
         if self.steps == 0 {
             return Moments::default();
@@ -229,7 +231,7 @@ impl Pace {
 }
 
 impl Moment {
-    /// `parameter` after a descent step along its gradient `slope`.
+    /// Returns `parameter` after a descent step with its gradient `slope`. Without a gradient it is unchanged.
     fn step<const D: usize>(
         &mut self,
         parameter: Tensor<D>,

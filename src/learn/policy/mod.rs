@@ -1,4 +1,5 @@
-//! Policies and critics, learned by reinforcement learning in a model or in JSBSim.
+//! Reinforcement learning of policies (networks that command the aircraft) and critics (networks that estimate the sum of
+//! future rewards), in simulations of a model or of JSBSim.
 
 pub(super) mod analytic;
 pub(super) mod checkpoint;

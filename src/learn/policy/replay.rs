@@ -15,7 +15,7 @@ pub struct Transition {
     pub reward: f32,
     /// Next observation, o'.
     pub next: [f32; OBSERVATIONS],
-    /// 1 if the next state is bootstrapped, 0 if the aircraft was lost (terminal).
+    /// Factor on the value of the next state in the critic's target: 1, or 0 if the aircraft was lost (terminal state).
     pub goes_on: f32,
 }
 
@@ -35,7 +35,7 @@ pub struct Batch {
     pub reward: Vec<f32>,
     /// Next observations o', `[size, OBSERVATIONS]`.
     pub next: Vec<f32>,
-    /// Bootstrap factors, see [`Transition::goes_on`].
+    /// Factors on the value of the next state, see [`Transition::goes_on`].
     pub goes_on: Vec<f32>,
 }
 

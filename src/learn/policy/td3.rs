@@ -1,12 +1,13 @@
-//! TD3 (Fujimoto et al. 2018), Table VII of \[GSFM26\], in the order of the algorithm.
+//! The update of TD3 (twin delayed deep deterministic policy gradient, Fujimoto et al. 2018) with the values of Table VII of
+//! \[GSFM26\]. The actor is the network of the policy. The two critics estimate the return, the discounted sum of rewards.
 //!
 //! Departures from the paper:
-//! - Observations are scaled, and contain the errors instead of the targets
-//!   ([`greylag_control::policy::observe`]): the information is the same.
-//! - Leaving the model's validity limits is terminal, with the smallest reward in all further steps,
-//!   −(κ_φ + κ_θ + κ_v)/(1 − γ). The time limit of an episode truncates it: the value of the next state is
-//!   bootstrapped. The paper specifies neither.
-//! - The actor's last layer is initialised near zero: neutral surfaces and half throttle.
+//! - Observations are scaled, and contain attitude errors instead of commanded attitudes
+//!   ([`greylag_control::policy::observe`]). The information is the same.
+//! - A state outside the model's validity limits is terminal. Its reward is that of infinitely many steps with the smallest
+//!   reward, −(κ_φ + κ_θ + κ_v)/(1 − γ). The end of an episode by its time limit is not terminal: the critics' value of the next
+//!   state is added. The paper specifies neither.
+//! - The actor's last layer is initialised near zero. The first commands are therefore near neutral surfaces and half throttle.
 
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng;
@@ -27,7 +28,7 @@ pub struct Hyperparameters {
     pub critic: Vec<usize>,
     /// Discount factor γ per step.
     pub discount: f64,
-    /// Rate τ of the target networks' soft update.
+    /// Fraction τ of the difference by which a soft update moves the target networks.
     pub tau: f64,
     /// Learning rate of the actor.
     pub actor_rate: f64,
@@ -39,7 +40,7 @@ pub struct Hyperparameters {
     pub smoothing: f64,
     /// Clipping limit of the smoothing noise, c.
     pub smoothing_clip: f64,
-    /// Standard deviation of the exploration noise.
+    /// Standard deviation of the exploration noise, in units of the action (−1..1).
     pub exploration: f64,
     /// Number of transitions in a minibatch.
     pub batch: usize,
@@ -63,7 +64,7 @@ impl Default for Hyperparameters {
     }
 }
 
-/// The six networks and their optimisers.
+/// Actor, two critics and their three target networks, with the optimisers.
 #[derive(Clone)]
 pub struct Td3 {
     settings: Hyperparameters,
@@ -81,15 +82,15 @@ struct Learner {
     optimiser: Optimiser,
 }
 
-/// Progress of an update.
+/// Losses of one update.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Losses {
-    /// Mean squared error of both critics, eq. (2).
+    /// Sum of the mean squared errors of the two critics, eq. (2).
     pub critics: f32,
 }
 
-/// State of a [`Td3`]: for the actor and both critics, the parameters of the network and of the target network, and
-/// the optimiser's moments.
+/// State of a [`Td3`] for a checkpoint. For the actor and each critic it has the parameters of the network, the parameters of the
+/// target network and the optimiser's moments.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Standing {
     /// Number of updates made.
@@ -111,7 +112,7 @@ impl Learner {
 }
 
 impl Td3 {
-    /// Networks initialised from `rng`.
+    /// Networks with random initial parameters from `rng`.
     ///
     /// # Errors
     ///
@@ -133,14 +134,14 @@ impl Td3 {
         })
     }
 
-    /// Makes one update from `batch`, eqs. (1) to (3). `rng` draws the smoothing noise.
+    /// Makes one update with the minibatch `batch`, eqs. (1) to (3). The smoothing noise is drawn from `rng`.
     pub fn update(&mut self, batch: &Batch, rng: &mut impl Rng) -> Losses {
         let rows = |numbers: &[f32], width: usize| -> Tensor<2> {
             let data = TensorData::new(numbers.to_vec(), [batch.size, width]);
             Tensor::from_data(data, &self.device)
         };
         let observed = rows(&batch.observed, OBSERVATIONS);
-        // target value of the next step: eq. (1)
+        // target of the critics from the next state: eq. (1)
         let next = rows(&batch.next, OBSERVATIONS);
         let noise = rows(&self.noise(batch.size, rng), ACTIONS);
         let action = (self.actor.target.forward(next.clone()).tanh() + noise).clamp(-1.0, 1.0);
@@ -149,7 +150,7 @@ impl Td3 {
         let value = one.target.forward(there.clone()).min_pair(two.target.forward(there));
         let goes_on = rows(&batch.goes_on, 1) * self.settings.discount;
         let wanted = (rows(&batch.reward, 1) + goes_on * value).autodiff();
-        // the critics: eq. (2)
+        // update of the critics: eq. (2)
         let here = Tensor::cat(vec![observed.clone(), rows(&batch.action, ACTIONS)], 1).autodiff();
         let followed = [one.network.followed(), two.network.followed()];
         let [one, two] =
@@ -160,7 +161,7 @@ impl Td3 {
             critic.optimiser.step(&mut critic.network, followed, &mut gradients);
         }
         self.updates += 1;
-        // actor, eq. (3), and target networks, every d updates
+        // every d updates, the actor, eq. (3), and the target networks are updated too
         if self.updates.is_multiple_of(self.settings.delay) {
             self.improve(observed);
         }
@@ -225,7 +226,7 @@ impl Td3 {
         Ok([one.network.to_dense()?, two.network.to_dense()?])
     }
 
-    /// State for a checkpoint.
+    /// The state of the training for a checkpoint.
     pub fn standing(&self) -> Standing {
         let [one, two] = &self.critics;
         let networks = [self.actor.standing(), one.standing(), two.standing()];

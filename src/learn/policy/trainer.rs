@@ -1,4 +1,5 @@
-//! Training of a policy with TD3 in any environment, with one update per environment step.
+//! Training of a policy with the algorithm TD3 (twin delayed policy gradient) in any environment. The number of updates is
+//! the number of environment steps after the warm-up.
 
 use std::sync::Arc;
 
@@ -17,17 +18,18 @@ use greylag_sim::Trouble;
 use greylag_sim::imagined::{Block, Ended, Stepped, WIDTH};
 use greylag_sim::world::World;
 
-/// Ids of the random streams.
+/// Ids of the random streams for initial weights, exploration and updates.
 const START: u64 = 20;
 const ACT: u64 = 21;
 const UPDATE: u64 = 22;
 
-/// Settings of a policy training. [`PolicyRecipe::default`] has those of \[GSFM26\].
+/// Settings of a policy training. [`PolicyRecipe::default`] has those of \[GSFM26\] (T. Guerin et al., 2026, see
+/// `src/lib.rs`).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PolicyRecipe {
-    /// Hyperparameters of TD3.
+    /// Hyperparameters of the algorithm TD3.
     pub td3: Hyperparameters,
-    /// Total number of environment steps, all aircraft together.
+    /// Total number of environment steps, summed over the simulated aircraft.
     pub steps: u64,
     /// Number of warm-up steps with random actions and without updates.
     pub warmup: u64,
@@ -35,11 +37,11 @@ pub struct PolicyRecipe {
     pub replay: usize,
     /// Number of simulated aircraft.
     pub instances: usize,
-    /// Fraction of the targets in the corners of the target range (bank of 45° to 60° with pitch of 25° to 30°),
-    /// 0..1.
+    /// Fraction (0..1) of the target attitudes that are drawn in the corners of the target range: |roll| of 45° to 60° with
+    /// |pitch| of 25° to 30°.
     pub corners: f64,
-    /// Number of steps between checkpoints. All episodes restart at a checkpoint. A resumed training therefore equals
-    /// an uninterrupted one.
+    /// Number of environment steps between checkpoints. All episodes restart at a checkpoint. A resumed training therefore
+    /// equals an uninterrupted one.
     pub checkpoint: u64,
     /// Seed of all random numbers.
     pub seed: u64,
@@ -63,7 +65,7 @@ impl Default for PolicyRecipe {
 /// A training cannot continue.
 #[derive(Debug, thiserror::Error)]
 pub enum PolicyError {
-    /// The loss is not finite.
+    /// The loss of the critics is not finite.
     #[error("the loss of the critics is not finite after {0} steps; lower the learning rates")]
     Loss(u64),
     /// A network cannot be used.
@@ -97,7 +99,7 @@ pub struct PolicyTrainer<W: World> {
     rewards: Vec<f64>,
 }
 
-/// Progress since the last query.
+/// Progress of a training. Loss and reward are means since the last call of [`PolicyTrainer::run`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PolicyProgress {
     /// Number of steps made.
@@ -107,12 +109,12 @@ pub struct PolicyProgress {
     /// Mean loss of the critics; NaN before the first update.
     pub loss: f64,
     /// Mean reward per step. A step in which an aircraft is lost counts here with the smallest reward of a single
-    /// step (−1.1, `Task::worst`). The critics learn the discounted sum of that reward over all further steps (−110,
-    /// `Task::of_loss`).
+    /// step, `Task::worst` (−1.1). For the critics, the reward of this step is the discounted sum of `Task::worst` over all
+    /// further steps, `Task::of_loss` (−110).
     pub reward: f64,
     /// Number of episodes started.
     pub episodes: u64,
-    /// Number of episodes that ended outside the limits.
+    /// Number of episodes that ended because a validity limit of the environment was exceeded.
     pub lost: u64,
 }
 
@@ -123,7 +125,7 @@ pub struct PolicyStanding {
     pub identity: String,
     /// Number of steps made.
     pub steps: u64,
-    /// Number of targets drawn.
+    /// Number of target attitudes drawn.
     pub targets: u64,
     /// Number of transitions ever added to the replay buffer.
     pub remembered: u64,
@@ -134,8 +136,8 @@ pub struct PolicyStanding {
 }
 
 impl<W: World> PolicyTrainer<W> {
-    /// A training in `world`, whose number of aircraft must be that of the recipe. `identity` distinguishes the
-    /// training from others.
+    /// A training in the environment `world`, whose number of aircraft must be that of the recipe. `identity` distinguishes
+    /// the training from others.
     ///
     /// # Errors
     ///
@@ -158,7 +160,7 @@ impl<W: World> PolicyTrainer<W> {
         })
     }
 
-    /// Trains for about `steps` further steps, within the recipe's total. Stops at every checkpoint.
+    /// Trains for about `steps` further steps. Stops earlier at a checkpoint or at the recipe's total number of steps.
     ///
     /// # Errors
     ///
@@ -188,14 +190,14 @@ impl<W: World> PolicyTrainer<W> {
         (self.steps / self.recipe.checkpoint + 1) * self.recipe.checkpoint
     }
 
-    /// Whether the last step crossed a checkpoint.
+    /// Whether the last step of all aircraft reached or crossed the step number of a checkpoint.
     pub fn at_checkpoint(&self) -> bool {
         let stretch = |steps: u64| steps / self.recipe.checkpoint;
         let before = self.steps.saturating_sub(self.world.instances() as u64);
         stretch(before) != stretch(self.steps)
     }
 
-    /// Makes one step of every aircraft, then as many updates as there are aircraft.
+    /// Makes one step of every aircraft. After the warm-up, makes as many updates as there are aircraft.
     fn advance(&mut self) -> Result<(), PolicyError> {
         let mut rng = stream::stream(self.recipe.seed, &[ACT, self.steps]);
         let instances = self.world.instances();
@@ -224,7 +226,7 @@ impl<W: World> PolicyTrainer<W> {
         Ok(())
     }
 
-    /// Random actions in the warm-up, then the actor's actions with exploration noise.
+    /// Actions for a block of aircraft: random ones in the warm-up, then the actor's actions with exploration noise.
     fn explore(&mut self, observed: &[Block; OBSERVATIONS], rng: &mut Stream) -> [Block; ACTIONS] {
         if self.steps < self.recipe.warmup {
             let mut action = [Block::zero(); ACTIONS];
@@ -249,7 +251,7 @@ impl<W: World> PolicyTrainer<W> {
         let lost = stepped.ended[lane] == Ended::Lost;
         let of = |numbers: &[Block; OBSERVATIONS]| numbers.map(|x| x.0[lane]);
         let task = Task { discount: self.recipe.td3.discount, ..Task::PAPER };
-        // the state of a lost aircraft may not be finite
+        // the state after the loss of an aircraft may not be finite and is not stored
         let reward = match lost {
             true => task.of_loss() as f32,
             false => stepped.reward.0[lane],
@@ -275,12 +277,12 @@ impl<W: World> PolicyTrainer<W> {
         &self.recipe
     }
 
-    /// The present actor.
+    /// The actor in its present state.
     pub fn actor(&self) -> Arc<Actor> {
         Arc::new(self.actor.clone())
     }
 
-    /// The present critics.
+    /// The critics in their present state.
     ///
     /// # Errors
     ///
@@ -302,7 +304,7 @@ impl<W: World> PolicyTrainer<W> {
         }
     }
 
-    /// Resumes from the checkpoint of a training with the same identity.
+    /// Resumes from the state `standing` of a training with the same identity.
     ///
     /// # Errors
     ///
@@ -317,7 +319,7 @@ impl<W: World> PolicyTrainer<W> {
         self.td3.resume(standing.td3)?;
         self.actor = Actor::new(self.td3.actor()?)?;
         self.steps = standing.steps;
-        // the first targets of the restarted episodes were drawn before the checkpoint was written
+        // before the checkpoint was written, the restart had already drawn one target for each aircraft
         let begun = self.world.instances() as u64;
         Ok(self.world.restart(standing.targets.saturating_sub(begun))?)
     }

@@ -1,11 +1,11 @@
-//! Counters of client traffic, with a rate-limited summary in the program's log.
+//! Counters of the MAVLink frames from clients (ground stations and scripts), with a summary in the program's log.
 
 use std::time::Duration;
 
 use super::{Clients, Now};
 use crate::framing::FrameCounts;
 
-/// Least interval between summaries in the log.
+/// Shortest interval between two summaries in the log.
 const SUMMARY: Duration = Duration::from_secs(10);
 
 /// Counters of the messages from clients.
@@ -15,9 +15,9 @@ pub struct ClientCounts {
     pub frames: FrameCounts,
     /// Frames with the ids of this program itself.
     pub echoes: u64,
-    /// Requests addressed to another system or component.
+    /// Requests that are addressed to another system or component.
     pub for_others: u64,
-    /// Frames from new peers while all sessions were in use.
+    /// Frames from new peers that got no session, because all sessions were in use.
     pub turned_away: u64,
     /// Setpoints and stick positions that were invalid or of an unsupported kind.
     pub refused_setpoints: u64,
@@ -25,12 +25,12 @@ pub struct ClientCounts {
     pub contested_setpoints: u64,
     /// Commands with an unsupported number.
     pub unknown_commands: u64,
-    /// Messages dropped because the outbox was full.
+    /// Outgoing messages that were dropped because the queue was full.
     pub dropped: u64,
 }
 
 impl Clients {
-    /// Logs one line after unusable frames, at most every 10 s.
+    /// Logs one line if further unusable input has arrived since the last line, at most every 10 s.
     pub(super) fn summarise(&mut self, now: Now) {
         let c = self.counts;
         let bad = c.frames.bad() + c.refused_setpoints + c.contested_setpoints + c.turned_away;

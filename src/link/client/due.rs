@@ -1,4 +1,4 @@
-//! Messages sent periodically: heartbeats and telemetry streams.
+//! Messages that clients, such as ground stations, receive periodically: heartbeats and telemetry streams.
 
 use std::time::Duration;
 
@@ -7,11 +7,11 @@ use crate::autopilot::Status;
 use crate::wire::mode::{self, Pulse};
 use crate::wire::telemetry::{self, Home, NAMED_VALUE_FLOAT, STREAMS, Scene};
 
-/// Interval of heartbeats.
+/// Interval between two heartbeats.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
 impl Clients {
-    /// Sets the home position: the first known position of the vehicle, then its position at each arming.
+    /// Sets the home position to the first known position of the vehicle, and later to its position at each arming.
     pub(super) fn note_home(&mut self, status: &Status) {
         let armed_now = status.armed && !self.was_armed;
         let known = status.position.iter().chain([&status.altitude]).all(|x| x.is_finite());
@@ -21,7 +21,7 @@ impl Clients {
         self.was_armed = status.armed;
     }
 
-    /// Sends a heartbeat to all peers every second and whenever its content changes, and one to each new peer.
+    /// Sends a heartbeat to all clients every second and whenever its content changes, and at once to a new client.
     pub(super) fn beat(&mut self, now: Now, status: &Status) {
         let pulse = Some(Pulse::of(status));
         let everybody = now.host >= self.next_heartbeat || self.pulse != pulse;

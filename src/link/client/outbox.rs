@@ -2,10 +2,10 @@
 
 use crate::peer::PeerId;
 
-/// Capacity in frames. A caller that drains after every call stays far below.
+/// Capacity, frames. A caller that drains the queue after every call never fills it.
 const CAPACITY: usize = 4096;
 
-/// A bounded queue: frames that do not fit are dropped and counted.
+/// A bounded queue of frames and their receivers. Frames that do not fit are dropped and counted.
 #[derive(Debug, Default)]
 pub struct Outbox {
     frames: Vec<(PeerId, Vec<u8>)>,
@@ -21,7 +21,7 @@ impl Outbox {
         }
     }
 
-    /// Removes all frames, oldest first.
+    /// Removes and returns all frames, oldest first.
     pub fn drain(&mut self) -> impl Iterator<Item = (PeerId, Vec<u8>)> + '_ {
         self.frames.drain(..)
     }

@@ -1,4 +1,4 @@
-//! The MAVLink parameter protocol.
+//! The MAVLink parameter protocol: clients list, read and set the companion's parameters.
 
 use super::{Clients, Now};
 use crate::autopilot::{Autopilot, Parameter, ParameterValue, Verdict};
@@ -13,8 +13,8 @@ fn find(table: &[Parameter], name: ParameterName) -> Option<usize> {
     table.iter().position(|parameter| parameter.name.as_bytes() == name.bytes())
 }
 
-/// The value converted to the table's type; `None` if the types do not match. An integer sent as REAL32 is accepted for
-/// an INT32, because pymavlink's `param_set_send` sends REAL32 by default.
+/// The value `sent`, if its type matches that of the parameter's value `table`; otherwise `None`. A whole number sent as REAL32
+/// is converted for an INT32, because pymavlink's `param_set_send` sends REAL32 by default.
 fn matched(table: ParameterValue, sent: Option<ParameterValue>) -> Option<ParameterValue> {
     match (table, sent?) {
         (ParameterValue::Real(_), value @ ParameterValue::Real(_)) => Some(value),
@@ -29,8 +29,8 @@ fn matched(table: ParameterValue, sent: Option<ParameterValue>) -> Option<Parame
 }
 
 impl Clients {
-    /// Sends the next parameters to every peer that requested the list. Only a few are sent per call, because a slow
-    /// link would drop the rest.
+    /// Sends the next parameters to every client that requested the list. Only a few are sent per call, because a slow link
+    /// would drop the rest.
     pub(super) fn list_parameters(&mut self, now: Now, table: &[Parameter]) {
         for session in &mut self.sessions {
             for index in session.parameters_due(now.host, table.len()) {
@@ -69,8 +69,8 @@ impl Clients {
         self.reply(at, &message);
     }
 
-    /// Sets a parameter. The value of an existing parameter is always sent in reply. After a change it is sent to all
-    /// peers. A refusal is also reported by PARAM_ERROR and as text.
+    /// Sets a parameter. If it exists, its value is always sent in reply, and after a change to all clients. A refusal is also
+    /// reported by PARAM_ERROR and as text.
     pub(super) fn set_parameter(
         &mut self,
         now: Now,

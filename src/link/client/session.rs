@@ -11,14 +11,15 @@ use crate::wire::Message;
 use crate::wire::answer::{self, CommandResult, TEXT_CHUNK};
 use crate::wire::request::CommandRequest;
 
-/// Silence after which a peer's MAVLink version is determined again, because another program may use its address.
+/// Time without frames from a peer after which its MAVLink version is determined again, because another program may be using its
+/// address by then.
 const VERSION_MEMORY: Duration = Duration::from_secs(5);
-/// Time within which the same command counts as a retransmission.
+/// Time after a command within which the same command counts as a retransmission.
 const COMMAND_MEMORY: Duration = Duration::from_secs(3);
-/// Largest burst of warnings to one peer, and the interval after which one more warning is allowed.
+/// Largest number of warnings to one peer without a pause, and the time after which one more warning is allowed.
 const COMPLAINTS: u32 = 10;
 const COMPLAINT_EVERY: Duration = Duration::from_millis(500);
-/// Parameters per call and the interval between calls: 200 parameters per second.
+/// Number of parameters that are sent at once, and the time to the next ones. The rate is 200 parameters per second.
 const PARAMETERS_AT_ONCE: usize = 2;
 const PARAMETERS_EVERY: Duration = Duration::from_millis(10);
 
@@ -27,7 +28,8 @@ const PARAMETERS_EVERY: Duration = Duration::from_millis(10);
 pub enum Stay {
     /// The session ends after a timeout without frames from the peer.
     WhileHeard,
-    /// The session lasts until the peer is removed. This applies to connections and to the target of a `udpout:` link.
+    /// The session lasts until the peer is removed. This applies to peers that are connected by TCP or a serial port, and to the
+    /// target of a `udpout:` link.
     UntilForgotten,
 }
 
@@ -40,7 +42,7 @@ pub struct Session {
     pub stay: Stay,
     /// Time of the last frame, or of the session's start, host clock.
     pub heard: Duration,
-    /// Whether the first heartbeat was sent.
+    /// Whether the first heartbeat was sent to the peer.
     pub greeted: bool,
     /// Message intervals of the peer's streams.
     pub streams: StreamTable,
@@ -75,8 +77,8 @@ impl Session {
         }
     }
 
-    /// Stores the version of a received frame. A peer that has sent MAVLink 2 gets MAVLink 2. A peer that has only sent
-    /// MAVLink 1 gets MAVLink 1.
+    /// Notes a received frame and the MAVLink version of the peer. A peer that has sent MAVLink 2 gets MAVLink 2. A peer that
+    /// has only sent MAVLink 1 gets MAVLink 1.
     pub fn note_frame(&mut self, host: Duration, frame: &Frame<'_>) {
         let stale = host.saturating_sub(self.heard) > VERSION_MEMORY;
         if !self.spoken || stale || frame.version == Version::V2 {
@@ -105,7 +107,8 @@ impl Session {
         }
     }
 
-    /// Sends a text of any length. MAVLink 2 receivers join its chunks. In MAVLink 1 each chunk is a separate text.
+    /// Sends a text of any length in chunks. A MAVLink 2 receiver joins the chunks of the text `id`. For MAVLink 1 each chunk is
+    /// a text of its own.
     pub fn say(
         &mut self,
         severity: Severity,
@@ -140,7 +143,7 @@ impl Session {
         allowed
     }
 
-    /// The earlier result of `command` if this is a retransmission; otherwise `None`.
+    /// If `command` is a retransmission, returns the result that was sent before; otherwise `None`.
     pub fn answered(&self, host: Duration, command: &CommandRequest) -> Option<CommandResult> {
         let (known, result, when) = self.last_command.as_ref()?;
         let same_bits = known.params.map(f64::to_bits) == command.params.map(f64::to_bits);
@@ -158,7 +161,7 @@ impl Session {
         self.listing = Some(0);
     }
 
-    /// Indices of the parameters to be sent now, from a table of `count` parameters.
+    /// Indices of the parameters that are to be sent now, from a table of `count` parameters. They then count as sent.
     pub fn parameters_due(&mut self, host: Duration, count: usize) -> std::ops::Range<usize> {
         let Some(next) = self.listing.filter(|_| host >= self.next_parameters) else {
             return 0..0;

@@ -1,4 +1,4 @@
-//! Setpoints from clients, which are accepted, refused as invalid, or ignored because another client has authority.
+//! Setpoints from clients. They are accepted, refused if they are invalid, or ignored if another client is in control.
 
 use super::{Clients, Now};
 use crate::autopilot::{AttitudeSetpoint, Autopilot, Sticks};

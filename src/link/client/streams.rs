@@ -1,12 +1,12 @@
-//! Message intervals of a client's streams.
+//! Intervals of the streams that a client receives. A stream is a MAVLink message that is sent periodically.
 //!
-//! The messages and their default rates are in [`STREAMS`] in `link/wire/telemetry.rs`.
+//! [`STREAMS`] in `link/wire/telemetry.rs` lists the messages and their default rates.
 
 use std::time::Duration;
 
 use crate::wire::telemetry::STREAMS;
 
-/// Shortest interval of a stream: one message per control cycle.
+/// Shortest interval of a stream: one control cycle.
 const SHORTEST: Duration = Duration::from_millis(10);
 /// Longest interval of a stream.
 const LONGEST: Duration = Duration::from_secs(60);
@@ -24,7 +24,7 @@ struct Row {
 }
 
 impl StreamTable {
-    /// A table with the default rates.
+    /// A table with the default rates. All streams are due at `host`, a time by this computer's clock.
     pub fn new(host: Duration) -> Self {
         StreamTable {
             rows: STREAMS
@@ -32,7 +32,8 @@ impl StreamTable {
         }
     }
 
-    /// Whether row `at` is due. If so, its next due time is one interval later. Missed messages are not sent later.
+    /// Whether row `at` is due at the time `host`. If so, it is due again one interval later. Messages that were missed in a
+    /// pause are not sent later.
     pub fn is_due(&mut self, at: usize, host: Duration) -> bool {
         let row = &mut self.rows[at];
         let Some(interval) = row.interval.filter(|_| host >= row.due) else {
@@ -50,8 +51,8 @@ impl StreamTable {
         self.rows[at].interval.map_or(-1, |interval| interval.as_micros() as i32)
     }
 
-    /// Sets row `at` as SET_MESSAGE_INTERVAL specifies: µs, 0 for the default, −1 for off. The interval is clamped to
-    /// 10 ms..60 s. `Err` for any other negative value and for NaN.
+    /// Sets the interval of row `at` as MAV_CMD_SET_MESSAGE_INTERVAL specifies: in µs, with 0 for the default and −1 for off. The
+    /// interval is clamped to 10 ms..60 s. `Err` for any other negative value and for NaN.
     pub fn set_interval(&mut self, at: usize, us: f64, host: Duration) -> Result<(), ()> {
         let interval = match us {
             -1.0 => None,
@@ -63,8 +64,8 @@ impl StreamTable {
         Ok(())
     }
 
-    /// Sets all streams of a REQUEST_DATA_STREAM group to a rate in Hz (0: their default rates), or turns them off
-    /// (`None`). Group 0 contains all streams that are on by default.
+    /// Sets all streams of a group of REQUEST_DATA_STREAM to `rate` in Hz. A rate of 0 restores their default rates, and `None`
+    /// turns them off. Group 0 means all streams that are on by default.
     pub fn set_group(&mut self, group: u8, rate: Option<u16>, host: Duration) {
         for (row, stream) in self.rows.iter_mut().zip(STREAMS) {
             let meant = stream.group == group || (group == 0 && stream.default_hz > 0.0);
@@ -95,7 +96,7 @@ mod tests {
     #[test]
     fn rates_are_limited_and_garbage_is_refused() {
         let mut table = StreamTable::new(Duration::ZERO);
-        // An interval of 1 µs would mean a million messages per second.
+        // 1 µs would be a million messages per second
         table.set_interval(0, 1.0, Duration::ZERO).unwrap();
         assert_eq!(table.interval_us(0), 10_000);
         table.set_interval(0, 1e30, Duration::ZERO).unwrap();
@@ -113,7 +114,7 @@ mod tests {
     fn a_pause_is_not_caught_up() {
         let mut table = StreamTable::new(Duration::ZERO);
         assert!(table.is_due(0, Duration::ZERO));
-        // At 10 Hz, one message follows after 5 s of silence, and the next 100 ms later.
+        // the stream has 10 Hz: after a pause of 5 s one message is due, and the next one 100 ms later
         let late = Duration::from_secs(5);
         assert!(table.is_due(0, late));
         assert!(!table.is_due(0, late + Duration::from_millis(99)));

@@ -7,8 +7,8 @@ use crc::{CRC_16_MCRF4XX, Crc, Table};
 
 static CHECKSUM: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_MCRF4XX);
 
-/// The checksum of a frame. `bytes` are those after the start marker up to the end of the payload. `extra` is
-/// CRC_EXTRA.
+/// The checksum of a frame. `bytes` begins after the start marker and ends with the payload. `extra` is the constant
+/// CRC_EXTRA of the message type.
 pub(crate) fn checksum(bytes: &[u8], extra: u8) -> u16 {
     let mut digest = CHECKSUM.digest();
     digest.update(bytes);

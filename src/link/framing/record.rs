@@ -1,4 +1,6 @@
-//! Check that the bytes of a log record are exactly one frame.
+//! Check that the bytes of a log record are exactly one MAVLink frame.
+//!
+//! The dialect is the set of messages that this program knows. The CRC of a frame can be checked only for these messages.
 
 use super::{Candidate, Frame, examine};
 
@@ -7,7 +9,7 @@ use super::{Candidate, Frame, examine};
 pub enum Whole<'a> {
     /// A frame of the dialect with a valid CRC.
     Known(Frame<'a>),
-    /// A plausible frame of a message outside the dialect, whose CRC cannot be checked.
+    /// A plausible frame of a message outside the dialect.
     Unknown,
     /// Bytes that are not a frame, or not exactly one.
     Damaged,

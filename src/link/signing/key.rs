@@ -1,4 +1,4 @@
-//! The signing key, which is read from a file that only its owner can read.
+//! The key for signing MAVLink frames. It is stored in a file that only its owner can read.
 
 use std::fmt;
 use std::fs::File;
@@ -22,7 +22,7 @@ impl fmt::Debug for Key {
     }
 }
 
-/// A key file cannot be used.
+/// Reason why a key file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum KeyError {
     /// The file cannot be read.
@@ -144,7 +144,7 @@ fn check_mode(file: &File, path: &Path) -> Result<(), KeyError> {
     }
 }
 
-/// Without Unix permissions the key file is not checked.
+/// On a system without Unix permissions, the permissions of the key file are not checked.
 #[cfg(not(unix))]
 fn check_mode(_: &File, _: &Path) -> Result<(), KeyError> {
     Ok(())

@@ -1,4 +1,7 @@
-//! Persistent signing timestamp: a thread writes it every second to a file in the key's folder.
+//! Persistent timestamp of MAVLink 2 signatures: a thread writes it every second to a file beside the key.
+//!
+//! A receiver rejects signatures whose timestamp is not newer than the last one. The timestamp must therefore not go back when
+//! the program restarts.
 
 use std::fs;
 use std::io::{ErrorKind, Write};
@@ -11,10 +14,10 @@ use std::time::Duration;
 
 use super::STAMP_MAX;
 
-/// Interval between writes.
+/// Interval between two writes of the file.
 const EVERY: Duration = Duration::from_secs(1);
-/// Margin that is added to the stored timestamp at a start: 2 s, in units of 10 µs. Timestamps in this range may have
-/// been used since the last write.
+/// Margin that is added to the stored timestamp when the file is opened: 2 s, in units of 10 µs. Timestamps in this range may
+/// have been used since the last write.
 const MARGIN: u64 = 200_000;
 
 /// The timestamp cannot be stored.
@@ -56,8 +59,8 @@ pub struct StampFile {
 }
 
 impl StampFile {
-    /// Opens the timestamp file of the key file `key`. Also returns the timestamp to start from, in units of 10 µs
-    /// since 2015.
+    /// Opens the timestamp file of the key file `key` and starts its thread. Also returns the timestamp to start from, in units
+    /// of 10 µs since 2015.
     ///
     /// # Errors
     ///
@@ -92,12 +95,12 @@ impl StampFile {
         Ok((StampFile { shown, troubles, stop: Some(stop), thread: Some(thread) }, next))
     }
 
-    /// The first error of the thread as text; `None` without an error, and after it was returned.
+    /// The first error of the thread as text; `None` if there was no error or it was returned before.
     pub fn trouble(&self) -> Option<String> {
         self.troubles.try_recv().ok()
     }
 
-    /// Passes the newest timestamp to the thread, which writes it within a second.
+    /// Passes the newest timestamp to the thread, which writes it within about a second.
     pub fn show(&self, stamp: u64) {
         self.shown.store(stamp, Ordering::Relaxed);
     }
@@ -107,14 +110,14 @@ impl Drop for StampFile {
     fn drop(&mut self) {
         drop(self.stop.take());
         if let Some(thread) = self.thread.take() {
-            // a panic of the thread has been reported by the thread
+            // the thread itself has reported its panic
             let _ = thread.join();
         }
     }
 }
 
-/// Writes the timestamp `seen` to `path` every second until `stopped`. `written` is the timestamp in the file. The first
-/// error is reported to `trouble`.
+/// Writes the timestamp `seen` to `path` every second, and once more when `stopped` is closed. `written` is the timestamp that
+/// the file already holds. The first error is sent to `trouble`.
 fn keep(
     path: &Path,
     mut written: u64,
@@ -129,7 +132,7 @@ fn keep(
         if now != written {
             match write(path, now) {
                 Ok(()) => written = now,
-                // a disk that is full for a while does no harm: the next write stores the newest timestamp
+                // a disk that is full for a while does little harm: the next write stores the newest timestamp
                 Err(why) if !reported => {
                     reported = true;
                     let words = format!(

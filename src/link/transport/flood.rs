@@ -1,24 +1,26 @@
-//! Rate limit on each sender of datagrams: a flood loses only packets of its own sender.
+//! Rate limit on each sender of datagrams. If a sender floods the socket, only its own packets are dropped.
 
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-/// Datagrams per second that are accepted from one sender. A flight controller that sends each message separately sends
-/// 500. A parameter list or a log at full speed takes 1000.
+/// Datagrams per second that are accepted from one sender. A flight controller that sends each message in its own datagram
+/// sends 500. A parameter list or a log at full speed takes 1000.
 const PER_SECOND: f64 = 4000.0;
-/// Burst in datagrams. A flight controller that sends 500 per second accumulates as many in a stall of 2 s.
+/// Number of datagrams that are accepted from one sender at once. As many arrive after a stall of 2 s from a flight controller
+/// that sends 500 per second.
 const BURST: f64 = 1000.0;
-/// Number of senders with a separate limit. All other senders share one limit.
+/// Number of senders that have their own limit. All other senders share one limit.
 const SENDERS: usize = 64;
-/// Time without datagrams after which a sender's entry is reused.
+/// Time without datagrams after which a sender's limit is given to a new sender.
 const GONE: Duration = Duration::from_secs(1);
 
-/// Token buckets of the senders.
+/// Token buckets of the senders: an accepted datagram takes one token, and tokens are added at a constant rate.
 #[derive(Debug, Default)]
 pub(super) struct Senders {
     known: Vec<(SocketAddr, Allowance)>,
-    /// Index of the last sender, which is tried first.
+    /// Index of the last datagram's sender in `known`. It is tried first.
     last: usize,
+    /// The bucket that all senders outside `known` share.
     strangers: Allowance,
 }
 
@@ -36,7 +38,7 @@ impl Default for Allowance {
 }
 
 impl Allowance {
-    /// Takes one token at `now`; `false` if there is none.
+    /// Takes one token at `now`. The result is `false` if there is none.
     fn take(&mut self, now: Instant) -> bool {
         let passed =
             self.at.replace(now).map_or(Duration::ZERO, |at| now.saturating_duration_since(at));
@@ -63,7 +65,7 @@ impl Senders {
         }
     }
 
-    /// Index of the bucket of `sender`: its own, a new or an expired bucket. `None` if all buckets are in use.
+    /// Index of the bucket of `sender`. A new sender gets a new bucket or that of a silent sender; `None` if there is neither.
     fn place(&mut self, sender: SocketAddr, now: Instant) -> Option<usize> {
         let own = self.known.iter().position(|(known, _)| *known == sender);
         if own.is_some() {
@@ -95,7 +97,7 @@ mod tests {
         let start = Instant::now();
         let mut senders = Senders::default();
         let mut taken = [0; 2];
-        // Ten seconds of 40,000 datagrams per second, and a client with 20 per second.
+        // for ten seconds one sender sends 40,000 datagrams per second, the other 20 per second
         for i in 0..400_000u64 {
             let now = start + Duration::from_micros(25 * i);
             taken[0] += u32::from(senders.may(sender(1), now));
@@ -103,7 +105,7 @@ mod tests {
                 taken[1] += u32::from(senders.may(sender(2), now));
             }
         }
-        // 4000 per second and the first burst.
+        // 4000 datagrams per second and the first burst of 1000
         assert!((40_900..=41_000).contains(&taken[0]), "{taken:?}");
         assert_eq!(taken[1], 200);
     }
@@ -121,8 +123,8 @@ mod tests {
             taken += u32::from(senders.may(sender(2 + (i % 60_000) as u16), now));
         }
         assert_eq!(own, 200);
-        // The other senders share 4000 per second and the first burst. Each of the 64 separate buckets adds about one
-        // per second.
+        // The other senders share 4000 datagrams per second and one burst of 1000. Through each of the 64 separate buckets about
+        // one more datagram per second is accepted.
         assert!(taken < 41_000 + 10 * 64, "{taken}");
     }
 }

@@ -18,11 +18,11 @@ const CHUNK: usize = 1024;
 const PARTIAL_FRAME_TIMEOUT: Duration = Duration::from_millis(50);
 /// Interval between attempts to reopen a port.
 const RETRY: Duration = Duration::from_millis(200);
-/// Longest time for writing a frame. The frame is then dropped, because the port is blocked.
+/// Longest time for writing a frame. After this time the port counts as blocked, and the frame is dropped.
 const STALLED: Duration = Duration::from_secs(1);
 /// Largest number of frames that wait for the port. If there are more, the oldest are dropped as obsolete.
 const BACKLOG: usize = 16;
-/// Signs of a wrong baud rate: this many bytes without a valid frame, over at least this time.
+/// A wrong baud rate is reported after this number of bytes without a valid frame, but not before this time has passed.
 const NOISE: (u64, Duration) = (400, Duration::from_secs(1));
 
 /// A serial port and its baud rate.
@@ -162,7 +162,7 @@ impl NoiseDetector {
         NoiseDetector { since: Instant::now(), bytes: 0, frames: 0, reported: false }
     }
 
-    /// Counts received bytes and frames. Returns whether a wrong baud rate is to be reported now, at most once.
+    /// Counts received bytes and frames. Returns `true` once: when a wrong baud rate is to be reported.
     fn is_noise(&mut self, bytes: usize, frames: usize) -> bool {
         self.bytes += bytes as u64;
         self.frames += frames as u64;
@@ -234,7 +234,7 @@ async fn write(
                 count(&port.counters.send_failed);
                 return false;
             }
-            // the write is blocked: a truncated frame is sent, which its receiver drops
+            // the write is blocked: a part of the frame may have been sent, which the receiver drops
             Err(_) => count(&port.counters.send_failed),
         }
     }

@@ -17,23 +17,23 @@ use crate::framing::StreamCutter;
 
 /// Largest number of connections of a listening link.
 const MAX_CONNECTIONS: usize = 16;
-/// Largest number of queued frames for one connection. A slow reader loses whole frames.
+/// Largest number of queued frames for one connection. Further frames are dropped while the peer reads too slowly.
 const QUEUE: usize = 256;
-/// Largest number of bytes per read. The frames of one read form one packet.
+/// Largest number of bytes per read. The complete frames of one read are delivered together.
 const CHUNK: usize = 1024;
-/// Silence after which an incomplete frame is dropped.
+/// Silence after which the rest of an incomplete frame is no longer awaited.
 const PARTIAL_FRAME_TIMEOUT: Duration = Duration::from_millis(100);
-/// Delay after a failed `accept`, for instance without free file descriptors.
+/// Pause after a failed `accept`, for instance if no file descriptor is free.
 const ACCEPT_RETRY: Duration = Duration::from_millis(100);
-/// Longest time for writing a frame, after which the peer is disconnected, and for a connection attempt.
+/// Longest time that a connection attempt may take. A peer that does not accept a frame within this time is disconnected.
 const STALLED: Duration = Duration::from_secs(5);
-/// Interval between connection attempts. It doubles from the first value up to the second.
+/// Pause before the next connection attempt. It starts at the first value and doubles with each attempt, up to the second.
 const BACK_OFF: (Duration, Duration) = (Duration::from_millis(250), Duration::from_secs(4));
 
-/// Open connections by the peer's address.
+/// The outgoing queues of the open connections, by the peer's address.
 type Connections = Arc<Mutex<HashMap<SocketAddr, Sender<Vec<u8>>>>>;
 
-/// Listens for peers. Returns the bound address.
+/// Listens for peers at the address `at`. Returns the address that was bound.
 pub(super) fn listen(
     port: Port,
     at: SocketAddr,
@@ -49,7 +49,7 @@ pub(super) fn listen(
     Ok(local)
 }
 
-/// Connects, and reconnects with exponential back-off whenever the connection is lost.
+/// Connects to `to`, and connects again whenever the connection is lost. The pauses grow as [`BACK_OFF`] states.
 pub(super) fn connect(port: Port, to: SocketAddr, outgoing: Receiver<(SocketAddr, Vec<u8>)>) {
     let connections = Connections::default();
     tokio::spawn(dispatch(port.clone(), connections.clone(), outgoing));
@@ -85,7 +85,7 @@ fn count_of(connections: &Connections) -> usize {
 
 /// Serves one connection until it ends.
 async fn serve(port: Port, connections: Connections, stream: TcpStream, peer: SocketAddr) {
-    // A command must not wait for further bytes of a segment. If this option fails, commands are only slower.
+    // A short frame is sent at once instead of waiting for further bytes. If the option cannot be set, frames are only later.
     let _ = stream.set_nodelay(true);
     let (reading, writing) = stream.into_split();
     let (queue, frames) = channel(QUEUE);
@@ -101,11 +101,11 @@ async fn serve(port: Port, connections: Connections, stream: TcpStream, peer: So
     }
 }
 
-/// Removes the connection with the queue `own`. Returns `false` if the peer has connected again from the same address:
-/// its new connection stays.
+/// Removes the connection of `peer` with the queue `own`, and returns `true`. If `peer` has connected again from the same
+/// address, its new connection stays and the result is `false`.
 fn remove(connections: &Connections, peer: SocketAddr, own: &WeakSender<Vec<u8>>) -> bool {
     let mut connections = connections.lock().unwrap_or_else(PoisonError::into_inner);
-    // a queue that the map no longer holds has no sender left
+    // if the map no longer contains the queue, no strong sender is left and `upgrade` fails
     let open = own.upgrade();
     let own = connections.get(&peer).zip(open).is_some_and(|(held, own)| held.same_channel(&own));
     if own {
@@ -114,7 +114,7 @@ fn remove(connections: &Connections, peer: SocketAddr, own: &WeakSender<Vec<u8>>
     own
 }
 
-/// Reads chunks and delivers the complete frames.
+/// Reads bytes from the connection and delivers the complete frames, until the connection ends.
 async fn read(port: &Port, mut stream: OwnedReadHalf, peer: SocketAddr) {
     let mut cutter = StreamCutter::default();
     let mut chunk = [0; CHUNK];
@@ -141,7 +141,7 @@ async fn read(port: &Port, mut stream: OwnedReadHalf, peer: SocketAddr) {
     }
 }
 
-/// Writes frames. Ends when the peer stops reading or the connection is lost.
+/// Writes the queued frames. Ends when the peer stops reading or the connection is lost.
 async fn write(port: &Port, mut stream: OwnedWriteHalf, mut frames: Receiver<Vec<u8>>) {
     while let Some(frame) = frames.recv().await {
         match timeout(STALLED, stream.write_all(&frame)).await {
@@ -151,7 +151,7 @@ async fn write(port: &Port, mut stream: OwnedWriteHalf, mut frames: Receiver<Vec
     }
 }
 
-/// Distributes frames to their connections. Ends when the link's last sender is gone.
+/// Moves outgoing frames to the queues of their connections. Ends when no sender of `outgoing` is left.
 async fn dispatch(
     port: Port,
     connections: Connections,

@@ -1,7 +1,7 @@
 //! UDP links: one socket for any number of peers.
 //!
-//! The socket is never connected. An unreachable peer (ICMP port unreachable) therefore does not disturb the other
-//! peers, and a peer may reply from another port than its receiving port.
+//! The socket is never connected to a peer. An unreachable peer (ICMP port unreachable) therefore does not disturb the
+//! other peers, and a peer may send from another port than the one at which it receives.
 
 use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
@@ -14,12 +14,12 @@ use tokio::sync::mpsc::Receiver;
 use super::flood::Senders;
 use super::{Port, count};
 
-/// Largest accepted datagram, bytes. MAVLink senders stay within an Ethernet frame. The limit allows jumbo frames.
+/// Largest accepted datagram, bytes: an Ethernet jumbo frame. MAVLink senders stay within a normal Ethernet frame.
 const MAX_DATAGRAM: usize = 9000;
-/// Delay after a socket error. It prevents a busy loop on a persistent error.
+/// Delay after an error of receiving. It prevents a busy loop on a persistent error.
 const ERROR_DELAY: Duration = Duration::from_millis(5);
 
-/// Listens at an address and sends from it. Returns the bound address.
+/// Opens a socket at the address `at` for receiving and sending. Returns the bound address.
 pub(super) fn listen(
     port: Port,
     at: SocketAddr,
@@ -28,13 +28,13 @@ pub(super) fn listen(
     serve(port, std::net::UdpSocket::bind(at)?, outgoing)
 }
 
-/// Binds a socket from which `to` can be reached. Returns the bound address.
+/// Opens a socket at a free port, from which the address `to` can be reached. Returns the bound address.
 pub(super) fn reach(
     port: Port,
     to: SocketAddr,
     outgoing: Receiver<(SocketAddr, Vec<u8>)>,
 ) -> io::Result<SocketAddr> {
-    // A socket for a loopback peer is bound to a loopback address. Other machines cannot reach the port.
+    // A socket for a peer on this machine is bound to a loopback address, so that other machines cannot reach it.
     let from: SocketAddr = match (to, to.ip().is_loopback()) {
         (SocketAddr::V4(_), true) => (Ipv4Addr::LOCALHOST, 0).into(),
         (SocketAddr::V4(_), false) => (Ipv4Addr::UNSPECIFIED, 0).into(),
@@ -75,7 +75,7 @@ async fn receive(port: Port, socket: Arc<UdpSocket>) {
     }
 }
 
-/// Sends queued frames. Ends when the link's last sender is gone.
+/// Sends the frames of the queue `outgoing`. Ends when all senders of the queue are dropped.
 async fn send(port: Port, socket: Arc<UdpSocket>, mut outgoing: Receiver<(SocketAddr, Vec<u8>)>) {
     while let Some((to, frame)) = outgoing.recv().await {
         match socket.send_to(&frame, to).await {

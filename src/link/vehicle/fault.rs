@@ -1,4 +1,4 @@
-//! Faults for which the pilot returns control authority to the flight controller.
+//! Faults after which the companion (Greylag's autopilot) returns control authority to the flight controller.
 
 use super::real::profile::Stack;
 
@@ -11,20 +11,20 @@ pub enum Axis {
     Pitch,
 }
 
-/// A fault for which control authority is returned.
+/// A fault after which control authority is returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// The state cannot be used for control.
+    /// The state of the aircraft is not usable for control.
     State,
     /// A failsafe is active: the client's setpoints or the vehicle's state were lost.
     Lost,
-    /// The aircraft responds to the surface with the opposite sign to the model.
+    /// The aircraft's response to the surface has the opposite sign to that of the model.
     Reversed(Axis),
     /// The aircraft does not respond to the surface.
     Unanswered(Axis),
-    /// The signs of the surfaces could not be determined.
+    /// It could not be determined in which direction the surfaces act.
     SignsUnknown,
-    /// A limit cycle about this axis with its surface at its limits.
+    /// A limit cycle of the control loop about this axis.
     Oscillation(Axis),
 }
 

@@ -1,16 +1,16 @@
-//! Plausibility limits of telemetry. A value beyond its limit indicates a fault of a sensor or of the link.
+//! Plausibility limits of the vehicle's telemetry. A value beyond its limit indicates a fault of a sensor or of the link.
 
 use std::fmt;
 use std::ops::RangeInclusive;
 
 use greylag_physics::servos::Travels;
 
-/// A set of implausible parts of a state frame.
+/// A set of faults: parts of a state frame (the vehicle's state at one instant) that are implausible or stale.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Faults(u8);
 
 impl Faults {
-    /// The empty set.
+    /// The empty set of faults.
     pub const NONE: Faults = Faults(0);
     /// The attitude is implausible.
     pub const ATTITUDE: Faults = Faults(1);
@@ -66,25 +66,24 @@ impl fmt::Display for Faults {
 
 /// Plausible body rates, rad/s. Common gyroscopes have a full scale of 2000 °/s, 35 rad/s.
 const RATE: RangeInclusive<f64> = -40.0..=40.0;
-/// Plausible airspeed, m/s. An aircraft of this kind never reaches 150 m/s. Values a little below zero are sensor
-/// noise.
+/// Plausible airspeed, m/s. A small aircraft never reaches 150 m/s. Values a little below zero are sensor noise.
 const AIRSPEED: RangeInclusive<f64> = -5.0..=150.0;
 /// Plausible altitude above mean sea level, m.
 const ALTITUDE: RangeInclusive<f64> = -1000.0..=20_000.0;
 /// Plausible angle of attack and sideslip, rad: ±180° with a tolerance for rounding.
 const INCIDENCE: RangeInclusive<f64> = -3.15..=3.15;
-/// Plausible specific force along each body axis, m/s²: 50 g.
+/// Plausible specific force along each body axis, m/s²: about ±50 g.
 const FORCE: RangeInclusive<f64> = -500.0..=500.0;
 /// Plausible normalised deflection (−1..1), with a tolerance for noise.
 const DEFLECTION: RangeInclusive<f64> = -1.5..=1.5;
-/// Plausible travel of a surface to each side, rad: above zero, at most 90°.
+/// Plausible travel of a surface to each side, rad: above zero and at most about 90°.
 const TRAVEL: RangeInclusive<f64> = 0.001..=1.6;
 /// Plausible throttle position (0..1), with a tolerance for noise.
 const THROTTLE: RangeInclusive<f64> = -0.25..=1.25;
-/// Plausible rate of the normalised deflection, 1/s. The limit of a real actuator is far below.
+/// Plausible rate of the normalised deflection, 1/s. Real actuators are far slower.
 const DEFLECTION_RATE: RangeInclusive<f64> = -1000.0..=1000.0;
 
-// A range does not contain NaN: each check below is false for NaN.
+// All checks below return false for NaN, because no range contains NaN.
 
 /// Whether the body rates p, q, r, rad/s, are plausible.
 pub fn rates(values: [f64; 3]) -> bool {
@@ -102,8 +101,8 @@ pub fn incidence(alpha: f64, beta: f64) -> bool {
 pub fn specific_force(values: [f64; 3]) -> bool {
     values.iter().all(|x| FORCE.contains(x))
 }
-/// Whether aileron, elevator, throttle, aileron rate, elevator rate, rudder and rudder rate are plausible (normalised;
-/// rates in 1/s).
+/// Whether positions and rates of the actuators are plausible, in the order aileron, elevator, throttle, aileron rate, elevator
+/// rate, rudder, rudder rate (normalised; rates in 1/s).
 pub fn actuators(
     [aileron, elevator, throttle, aileron_rate, elevator_rate, rudder, rudder_rate]: [f64; 7],
 ) -> bool {
@@ -121,8 +120,8 @@ pub fn travels(travels: &Travels) -> bool {
 pub fn position([latitude, longitude]: [f64; 2]) -> bool {
     latitude.abs() <= 90.0 && longitude.abs() <= 180.0
 }
-/// Whether a velocity over ground, m/s, is plausible: at most 250 m/s in each component, the largest airspeed and the
-/// largest wind together.
+/// Whether a velocity over ground, m/s, is plausible: at most 250 m/s in each component. This is the largest plausible airspeed
+/// plus the largest plausible wind.
 pub fn ground_velocity(values: [f64; 3]) -> bool {
     values.iter().all(|x| x.abs() <= 250.0)
 }

@@ -1,8 +1,8 @@
-//! The `px4` and `ardupilot` profiles: the vehicle is a real flight controller, which has priority.
+//! The `px4` and `ardupilot` profiles: the vehicle is a real flight controller, whose decisions have priority.
 //!
-//! The flight controller flies until a client requests engagement. The companion then commands it through the interface
-//! of its stack. At the first fault the companion returns control authority. The interfaces of the stacks are in
-//! `profile`.
+//! In this module "controller" means the flight controller, and "stack" its software, PX4 or ArduPilot. The controller flies
+//! until a client requests engagement, that is, until the companion shall fly. The companion then commands the controller
+//! through the interface of its stack (see `profile`). At the first fault the companion returns control authority.
 
 pub mod air_data;
 mod assembly;
@@ -47,7 +47,8 @@ pub const ONBOARD: u8 = 191;
 const AUTOPILOT: u8 = 1;
 /// Time without heartbeats after which a controller counts as disconnected.
 const GONE: Duration = Duration::from_secs(3);
-/// Fraction of its nominal rate below which a stream is requested again and engagement is refused.
+/// If the rate of a message stream is below this fraction of its nominal rate, the stream is requested again. If the stream is
+/// needed for control, engagement is refused.
 const ENOUGH: f64 = 0.8;
 
 /// The connected controller.
@@ -66,30 +67,32 @@ struct Controller {
 pub struct Real {
     profile: Profile,
     controller: Option<Controller>,
-    /// Other autopilots on the link, and another companion with the ids of this companion. Each was reported once.
+    /// Unexpected senders on the link: other autopilots, and another companion with the ids of this companion. Each was reported
+    /// once.
     intruders: Vec<Source>,
-    /// Another component of the controller's system (such as a gimbal or a camera) that sends heartbeats, with the time
-    /// of the last one.
+    /// Another component of the controller's system that sends heartbeats, such as a gimbal or a camera, and the time of its last
+    /// heartbeat.
     sibling: Option<(Duration, Source)>,
     /// Host time of the last call of `due`.
     now: Duration,
     parameters: Parameters,
     survey: Survey,
     requests: Requests,
-    /// Whether any frame of the controller had a signature.
+    /// Whether the controller has sent a frame with a MAVLink signature.
     signs: bool,
-    /// Whether the controller receives an RC transmitter, as reported while the companion had no control authority;
-    /// `None` before the first report.
+    /// Whether the controller receives an RC transmitter, from its last report without engagement; `None` before the first
+    /// report.
     radio: Option<bool>,
-    /// Delay margin of the loop through the surfaces; `None` if unknown.
+    /// Delay margin of the companion's control loop if it commands the surfaces; `None` if unknown.
     bears: Option<Duration>,
     assembly: Assembly,
     engagement: Engagement,
     sticks: Sticks,
     ramp: AttitudeRamp,
     trim: AttitudeTrim,
-    /// The last command that was demanded, in −1..1 (throttle 0..1).
+    /// The last finite command that the companion demanded, −1..1 (throttle 0..1).
     sent: Command,
+    /// Host time of the last state frame.
     last_state: Option<Duration>,
     pulse: Pulse,
     states: u64,
@@ -143,14 +146,14 @@ impl Real {
         }
     }
 
-    /// Returns control authority. Completion is reported when the controller's mode confirms it.
+    /// Begins to return control authority for `reason`. The end is reported when the controller's mode confirms it.
     fn hand_back(&mut self, reason: String) {
         self.engagement.hand_back();
         self.notices.push_back(Notice::Released(reason));
     }
 
-    /// The frames that reply to the state of vehicle time `time`. They command the actuators as demanded; empty if no
-    /// command is due.
+    /// The encoded message that commands `demand` to the controller, in reply to the state with vehicle time `time`. Empty if no
+    /// command is due. Begins engagement if the companion is armed, and returns control authority if `demand` has a fault.
     pub fn answer(&mut self, host: Duration, time: Time, demand: &Demand) -> Vec<u8> {
         let Outputs::Armed(command) = demand.outputs else {
             self.engagement.rest();
@@ -198,12 +201,12 @@ impl Real {
         self.write(&message)
     }
 
-    /// The roll and pitch to send for the demanded `wanted`, rad: rate-limited, and with integral correction while the
-    /// controller flies them.
+    /// The roll and pitch (rad) that are sent for the demanded ones, `wanted`: limited in rate, and with an integral correction
+    /// while the controller executes them.
     fn commanded(&mut self, time: Time, wanted: [f64; 2]) -> [f64; 2] {
         let seen = self.assembly.attitude();
         if !self.flies() {
-            // until the controller flies attitude setpoints, the measured attitude is sent
+            // until the controller executes attitude setpoints, the measured attitude is sent
             self.ramp.rest();
             self.trim.rest();
             return self.ramp.command(time, wanted, seen);
@@ -227,7 +230,7 @@ impl Real {
         self.engagement.steers()
     }
 
-    /// Peer of the controller, see [`super::Vehicle::peer`]; `None` before the first heartbeat.
+    /// The controller's address on the link, see [`super::Vehicle::peer`]; `None` before the first heartbeat.
     pub fn peer(&self) -> Option<PeerId> {
         self.controller.map(|c| c.peer)
     }
@@ -237,7 +240,7 @@ impl Real {
         self.controller.map(|c| c.system)
     }
 
-    /// The controller's MAV_AUTOPILOT, and whether it is armed; `None` before the first heartbeat.
+    /// The controller's stack as the number MAV_AUTOPILOT, and whether it is armed; `None` before the first heartbeat.
     pub fn controller(&self) -> Option<(u8, bool)> {
         self.controller.map(|c| (c.autopilot, c.armed))
     }
@@ -247,7 +250,7 @@ impl Real {
         &self.survey
     }
 
-    /// Name, check result and text of each checked parameter.
+    /// For each checked parameter of the controller: its name, the result of the check, and a text.
     pub fn parameter_report(&self) -> Vec<(&'static str, Standing, String)> {
         self.parameters.report(self.system().unwrap_or(1), self.radio == Some(true))
     }
@@ -272,7 +275,7 @@ impl Real {
     }
 
     fn write(&mut self, message: &Message) -> Vec<u8> {
-        // until a controller is received, its system id is assumed to be 1
+        // before the controller's first heartbeat its system id is assumed to be 1
         let source = Source { system: self.system().unwrap_or(1), component: ONBOARD };
         self.sequence = self.sequence.wrapping_add(1);
         message.encode(Version::V2, self.sequence, source).unwrap_or_default()

@@ -1,4 +1,5 @@
-//! The `sitl` profile: five messages form a state frame, which one message answers.
+//! The `sitl` profile: the link to the simulator `greylag-sitl`. Its shim, the simulator's MAVLink side, sends the vehicle's
+//! state as five messages, a state frame. The companion answers each state frame with one command message.
 
 use std::time::Duration;
 
@@ -17,13 +18,15 @@ use greylag_physics::{ActuatorState, Command, State, Time};
 const SHIM: u8 = 200;
 /// Component id of the companion.
 const COMPANION: u8 = 1;
-/// Time between state frames, µs.
+/// Nominal time between state frames, µs.
 const PERIOD_US: u64 = 10_000;
-/// Step back of the clock, µs, above which the vehicle has restarted. A smaller step back is a late datagram.
+/// If a timestamp is older than the last one by more than this, µs, the vehicle has restarted. If it is older by less, the
+/// datagram is late.
 const RESTART_US: u64 = 1_000_000;
-/// Silence after which another peer may take over the link.
+/// Silence of the present peer (network address) of the link after which another peer may take over.
 const TAKEOVER: Duration = Duration::from_secs(1);
-/// Relative tolerance between the travels of airframe and vehicle. The airframe file has four digits.
+/// Largest relative difference at which surface travels of airframe file and vehicle count as equal. The airframe file has
+/// four digits.
 const TRAVEL_TOLERANCE: f64 = 1e-3;
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
@@ -34,25 +37,25 @@ pub struct VehicleCounts {
     pub frames: FrameCounts,
     /// State frames delivered as new.
     pub states: u64,
-    /// State frames lost, from gaps in their timestamps.
+    /// State frames lost, counted from gaps between the timestamps.
     pub lost: u64,
-    /// State frames that were received again.
+    /// State frames with the same timestamp as the one before.
     pub repeated: u64,
     /// State frames that arrived after a newer one.
     pub late: u64,
     /// State frames that lack a message, or whose messages have different timestamps.
     pub incomplete: u64,
-    /// State frames with at least one fault.
+    /// State frames with at least one fault (implausible value).
     pub faulty: u64,
     /// Starts of the vehicle's clock, including the first.
     pub starts: u64,
-    /// MAVLink frames from senders other than the vehicle.
+    /// Valid MAVLink frames from senders other than the vehicle.
     pub foreign: u64,
     /// Commands that were not finite and were replaced by the last finite command.
     pub bad_commands: u64,
 }
 
-/// Messages received so far of the next state frame.
+/// Contents of the messages of the next state frame that have been received so far.
 #[derive(Clone, Copy, Debug, Default)]
 struct Parts {
     imu: Option<(Time, [f64; 3])>,
@@ -69,11 +72,11 @@ pub struct Sitl {
     travels: Travels,
     /// Surfaces and motors of the airframe; `None` if the airframe does not name them.
     mixer: Option<Mixer>,
-    /// The vehicle's travels, if they differ from the airframe's.
+    /// The vehicle's surface travels, if they differ from those of the airframe file.
     foreign_travel: Option<Travels>,
     told_foreign_travel: bool,
     parts: Parts,
-    /// The last delivered state. Faulty parts of the next state keep its values.
+    /// The newest delivered state. Parts of the next state that are faulty take their values from it.
     last: Telemetry,
     peer: Option<(PeerId, Duration)>,
     last_command: Command,
@@ -83,8 +86,8 @@ pub struct Sitl {
 }
 
 impl Sitl {
-    /// A connection to the vehicle with the system id `system`. `travels` are the surface travels of the airframe file.
-    /// The vehicle normalises surface positions by its own travels. If the two differ, the vehicle cannot be engaged.
+    /// A connection to the vehicle with the system id `system`. `travels` are the surface travels of the airframe file. The
+    /// vehicle normalises surface positions by its own travels. If these differ from `travels`, it cannot be controlled.
     pub fn new(system: u8, travels: Travels) -> Self {
         let nan = f64::NAN;
         let nothing = Telemetry {
@@ -118,7 +121,8 @@ impl Sitl {
         }
     }
 
-    /// Also sends the commands of the individual surfaces and motors, after the four controls.
+    /// With a mixer, a command message also has the commands of the individual surfaces and motors, after those of aileron,
+    /// elevator, throttle and rudder.
     pub fn with_mixer(self, mixer: Option<Mixer>) -> Self {
         Sitl { mixer, ..self }
     }
@@ -144,8 +148,8 @@ impl Sitl {
         self.counts.frames.add(counts);
     }
 
-    /// Whether the frame is from the vehicle: it has the right ids and comes from the present peer of the link. This
-    /// keeps the states of two simultaneous shims apart.
+    /// Whether the frame is from the vehicle: it has the right ids and comes from the present peer of the link. The states of
+    /// two simulators that run at the same time are therefore not mixed.
     fn is_vehicle(&mut self, host: Duration, peer: PeerId, frame: &Frame<'_>) -> bool {
         if frame.source != (Source { system: self.system, component: SHIM }) {
             return false;
@@ -226,7 +230,7 @@ impl Sitl {
         self.foreign_travel = (!alike(&found, &self.travels)).then_some(found);
     }
 
-    /// Reason for which the vehicle cannot be engaged, see [`super::Vehicle::obstacle`].
+    /// Reason for which the companion cannot take control of the vehicle, see [`super::Vehicle::obstacle`].
     pub fn obstacle(&self) -> Option<String> {
         self.foreign_travel.map(|found| {
             format!(
@@ -238,7 +242,7 @@ impl Sitl {
         })
     }
 
-    /// The oldest notice, see [`super::Vehicle::take_notice`]. Differing travels are reported once.
+    /// The next notice, see [`super::Vehicle::take_notice`]. The only notice of this profile is about differing travels, once.
     pub fn take_notice(&mut self) -> Option<Notice> {
         if self.told_foreign_travel {
             return None;
@@ -248,7 +252,7 @@ impl Sitl {
         Some(Notice::Text(Severity::Error, format!("cannot be engaged: {obstacle}")))
     }
 
-    /// Determines the order of a frame by its timestamp, and updates the counters.
+    /// Compares the timestamp of a state frame with that of the newest one, and updates the counters.
     fn order(&mut self, time: Time) -> Order {
         let (now, before) = (time.as_micros(), self.last.time.as_micros());
         if self.counts.starts == 0 || now.saturating_add(RESTART_US) < before {
@@ -275,8 +279,7 @@ impl Sitl {
         }
     }
 
-    /// The reply to a state, see [`super::Vehicle::answer`]. The last finite command replaces a command that is not
-    /// finite.
+    /// The reply to a state, see [`super::Vehicle::answer`]. A command that is not finite is replaced by the last finite one.
     pub fn command(&mut self, time: Time, outputs: Outputs) -> Vec<u8> {
         let outputs = match outputs {
             Outputs::Armed(command) if !command.is_finite() => {
@@ -304,7 +307,7 @@ impl Sitl {
         Some(self.write(&wire::heartbeat(outputs)))
     }
 
-    /// Peer of the vehicle, see [`super::Vehicle::peer`].
+    /// The present peer of the link, see [`super::Vehicle::peer`].
     pub fn peer(&self) -> Option<PeerId> {
         self.peer.map(|(peer, _)| peer)
     }
@@ -354,7 +357,8 @@ fn fill_air(
     }
 }
 
-/// Whether two aircraft have the same travels. A rudder that only the vehicle has stays centred and is not compared.
+/// Whether the vehicle's travels `found` equal the airframe's travels `wanted`. A rudder that only the vehicle has stays
+/// centred and is not compared.
 fn alike(found: &Travels, wanted: &Travels) -> bool {
     let close = |a: f64, b: f64| (a - b).abs() <= TRAVEL_TOLERANCE * b.abs();
     let same = |a: Travel, b: Travel| close(a.least, b.least) && close(a.most, b.most);
@@ -363,7 +367,7 @@ fn alike(found: &Travels, wanted: &Travels) -> bool {
         && wanted.rudder.is_none_or(|wanted| found.rudder.is_some_and(|found| same(found, wanted)))
 }
 
-/// The travel of the surfaces as text.
+/// The travels of the surfaces as text.
 fn described(travels: &Travels) -> String {
     let one = |travel: Travel| match travel.is_symmetric() {
         true => format!("{:.4} rad", travel.most),

@@ -1,4 +1,4 @@
-//! Replies to requests of clients.
+//! MAVLink messages that reply to requests of clients.
 
 use mavlink::dialects::ardupilotmega::{
     AUTOPILOT_VERSION_DATA, FILE_TRANSFER_PROTOCOL_DATA, HOME_POSITION_DATA, MESSAGE_INTERVAL_DATA,
@@ -38,7 +38,7 @@ pub fn command_ack(number: u16, result: CommandResult, to: Source) -> Message {
     Message::raw(77, vec![low, high, result as u8, 0, 0, 0, 0, 0, to.system, to.component], 3)
 }
 
-/// PARAM_VALUE of one table entry.
+/// PARAM_VALUE for one entry of the parameter table.
 pub fn parameter_value(parameter: &Parameter, index: usize, count: usize) -> Message {
     // MAV_PARAM_TYPE: 6 is INT32, 9 is REAL32. Encoded by hand, so that no integer passes through a float.
     let (value, kind) = match parameter.value {
@@ -177,7 +177,7 @@ pub fn empty_mission(kind: u8, to: Source) -> Message {
     Message::raw(44, vec![0, 0, to.system, to.component, kind, 0, 0, 0, 0], 4)
 }
 
-/// The result of a mission step, MAV_MISSION_RESULT.
+/// The result of a step of the mission protocol, MAV_MISSION_RESULT.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MissionResult {
     /// The step was carried out.
@@ -193,7 +193,7 @@ pub fn mission_ack(result: MissionResult, kind: u8, to: Source) -> Message {
     Message::raw(47, vec![to.system, to.component, result as u8, kind, 0, 0, 0, 0], 3)
 }
 
-/// FTP refusal: NAK with "unknown command", because there are no files.
+/// Refusal of a request of the file-transfer protocol: NAK with "unknown command", because there are no files.
 pub fn file_nak(sequence: u16, session: u8, opcode: u8, to: Source) -> Message {
     const NAK: u8 = 129;
     const UNKNOWN_COMMAND: u8 = 7;

@@ -1,4 +1,4 @@
-//! Messages between the companion and a real flight controller.
+//! Messages between the companion (Greylag's autopilot) and a real flight controller.
 
 use mavlink::Message as _;
 use mavlink::dialects::ardupilotmega::{
@@ -17,9 +17,9 @@ pub const SET_MODE: u16 = 176;
 /// Command number of MAV_CMD_SET_MESSAGE_INTERVAL.
 pub const SET_MESSAGE_INTERVAL: u16 = 511;
 
-/// Assumed standard deviations of the wind in WIND_COV (PX4) and in WIND (ArduPlane), m/s. PX4's wind had an error of
-/// 0.1 m/s in calm air. ArduPlane's wind is sent at 2 Hz and drifts by 0.9 m/s. Assuming 0.5 m/s for it gave a sideslip
-/// error of 1.3° (standard deviation), assuming 4 m/s gave 0.3° (`tests/firmware/angles.py`).
+/// Assumed standard deviations of the wind in WIND_COV (PX4) and in WIND (ArduPlane), m/s. PX4's wind had an error of 0.1 m/s
+/// in calm air. ArduPlane's wind is sent at 2 Hz and drifts by 0.9 m/s: with an assumed 0.5 m/s the estimated sideslip had a
+/// standard error of 1.3°, with 4 m/s 0.3° (`tests/firmware/angles.py`).
 const WIND_COV_SD: f64 = 0.5;
 const WIND_SD: f64 = 4.0;
 
@@ -114,7 +114,7 @@ pub enum ControllerMessage {
         /// Text of the chunk.
         words: String,
     },
-    /// TIMESYNC reply.
+    /// Reply to a TIMESYNC request of this program.
     TimeSync {
         /// The time that this program sent in its request, ns.
         ours: i64,
@@ -127,11 +127,11 @@ const RECEIVER: u32 = 1 << 16;
 /// Gas constant of dry air, J/(kg K).
 const AIR: f64 = 287.053;
 
-/// Decodes a frame from a flight controller; `None` for messages that no profile uses.
+/// Decodes a frame from a flight controller; `None` for messages that the companion does not use.
 pub fn read(frame: &Frame<'_>) -> Option<ControllerMessage> {
     let fields = Fields(frame.payload);
     match frame.id {
-        // Decoded by byte offset, because rust-mavlink rejects enumeration values of later releases.
+        // Decoded by byte offset, because rust-mavlink rejects enumeration values that later releases of MAVLink added.
         0 => {
             return Some(ControllerMessage::Heartbeat {
                 autopilot: fields.u8(5),
@@ -210,20 +210,20 @@ fn measured(message: MavMessage) -> Option<ControllerMessage> {
             ControllerMessage::Wind { velocity, sd: WIND_COV_SD }
         }
         MavMessage::WIND(m) => {
-            // `direction` is the direction from which the wind comes
+            // `direction` is the direction from which the wind blows
             let (sin, cos) = wide(m.direction).to_radians().sin_cos();
             let speed = wide(m.speed);
             let velocity = [-speed * cos, -speed * sin, wide(m.speed_z)];
             ControllerMessage::Wind { velocity, sd: WIND_SD }
         }
-        // A reply has the other side's time in `tc1`, and a request has zero.
+        // In a reply, `tc1` is the time of the other side. In a request it is zero.
         MavMessage::TIMESYNC(m) if m.tc1 != 0 => ControllerMessage::TimeSync { ours: m.ts1 },
         _ => return None,
     })
 }
 
-/// Air density from pressure and temperature (°C), kg/m³; NaN outside the lower atmosphere. The message specifies hPa.
-/// PX4 releases of 2025 send Pa, so a value above 10 000 is taken as Pa.
+/// Air density from pressure and temperature (°C), kg/m³; NaN if one of them is implausible. MAVLink specifies the pressure in
+/// hPa. PX4 releases of 2025 send Pa, so a value above 10 000 is taken as Pa.
 fn density(pressure: f64, temperature: f64) -> f64 {
     let pressure = if pressure > 10_000.0 { pressure / 100.0 } else { pressure };
     let believable = (200.0..=1100.0).contains(&pressure) && (-80.0..=85.0).contains(&temperature);
@@ -247,7 +247,7 @@ pub fn steers(id: u32) -> bool {
 /// Message id of SETUP_SIGNING, which contains a secret key and is never forwarded.
 pub const SETUP_SIGNING: u32 = 256;
 
-/// HEARTBEAT of an onboard computer.
+/// HEARTBEAT of an onboard computer. `engaged` states whether the companion has control authority.
 pub fn heartbeat(engaged: bool) -> Message {
     Message::coded(MavMessage::HEARTBEAT(HEARTBEAT_DATA {
         custom_mode: 0,
@@ -277,7 +277,7 @@ pub fn message_interval(to: Source, id: u32, interval_us: f32) -> Message {
     command(to, SET_MESSAGE_INTERVAL, [id as f32, interval_us, 0.0])
 }
 
-/// Request for a mode by the stack's mode number and sub mode (0 without one).
+/// Request for a flight mode by the stack's mode number and sub mode (0 without one).
 pub fn set_mode(to: Source, main: u8, sub: u8) -> Message {
     // The first parameter is MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
     command(to, SET_MODE, [1.0, f32::from(main), f32::from(sub)])
@@ -323,7 +323,7 @@ pub fn channels_override(to: Source, [one, two, three]: [u16; 3]) -> Message {
     }))
 }
 
-/// SET_ATTITUDE_TARGET with roll and pitch (rad) at yaw zero, and thrust 0..1. Body rates are masked.
+/// SET_ATTITUDE_TARGET with roll and pitch (rad) at yaw zero, and thrust 0..1. The receiver ignores the body rates.
 pub fn attitude_target(to: Source, time_ms: u32, [roll, pitch]: [f64; 2], thrust: f64) -> Message {
     Message::coded(MavMessage::SET_ATTITUDE_TARGET(SET_ATTITUDE_TARGET_DATA {
         time_boot_ms: time_ms,
@@ -352,7 +352,7 @@ mod tests {
 
     #[test]
     fn pressure_is_read_in_hectopascal_and_in_pascal() {
-        // 934.0756 hPa at 10.6 °C, which a real PX4 sent in Pa: 93407.56 / (287.053 · 283.75).
+        // A real PX4 sent 934.0756 hPa in Pa, at 10.6 °C: 93407.56 / (287.053 · 283.75).
         for pressure in [934.0756, 93_407.56] {
             assert!(
                 (density(pressure, 10.6) - 1.14678).abs() < 1e-4,

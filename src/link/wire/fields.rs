@@ -1,6 +1,7 @@
-//! Payload fields read by byte offset, for messages in which unknown enumeration values must not reject a frame.
+//! Reads the fields of a payload by their byte offset. This is for messages that must not be rejected because of an unknown
+//! enumeration value.
 
-/// A payload whose truncated trailing bytes read as zeros, as in MAVLink 2.
+/// A payload. Bytes beyond its end read as zeros, because MAVLink 2 truncates trailing zero bytes.
 #[derive(Clone, Copy)]
 pub struct Fields<'a>(pub &'a [u8]);
 

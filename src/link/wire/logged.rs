@@ -1,39 +1,38 @@
-//! Messages of a telemetry log as named numbers, in the units of MAVLink.
+//! Decodes the MAVLink messages of a telemetry log into named numbers, in the units of MAVLink.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{self as messages, MavMessage};
 
 use super::{Frame, decode};
 
-/// Timestamp inside a message.
+/// Timestamp that a message contains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Own {
     /// Milliseconds since the sender started, modulo 2³².
     BootMs(u32),
-    /// Microseconds since the sender started, or since 1970, depending on the sender. Those of SERVO_OUTPUT_RAW are
-    /// modulo 2³².
+    /// Microseconds since the sender started, or since 1970, depending on the sender. In SERVO_OUTPUT_RAW they are modulo 2³².
     Micros(u64),
     /// The message has no timestamp.
     None,
 }
 
-/// A message as named numbers.
+/// A message as a list of named numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Values {
     /// Name of the message.
     pub topic: &'static str,
-    /// Timestamp inside the message; `Own::None` without one.
+    /// Timestamp that the message contains.
     pub own: Own,
-    /// Names of the message's fields.
+    /// Names of the fields, in the order of `values`.
     pub fields: &'static [&'static str],
-    /// Values of the fields in the units of MAVLink. Values beyond the length of `fields` are unused.
+    /// Values of the fields in the units of MAVLink. Only as many are used as there are names in `fields`.
     pub values: [f64; 16],
 }
 
-/// A message that a log reader uses.
+/// A decoded message.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Logged {
-    /// A message of numbers.
+    /// A message with states, commands or the status of the vehicle.
     Values(Values),
     /// A parameter from PARAM_VALUE.
     Parameter {
@@ -44,7 +43,7 @@ pub enum Logged {
     },
 }
 
-/// Names of the fields with actuator controls, actuator outputs and servo outputs.
+/// Field names of HIL_ACTUATOR_CONTROLS, of ACTUATOR_OUTPUT_STATUS and of SERVO_OUTPUT_RAW.
 const CONTROLS: [&str; 4] = ["controls0", "controls1", "controls2", "controls3"];
 const ACTUATORS: [&str; 16] = [
     "actuator0",
@@ -83,7 +82,7 @@ const SERVOS: [&str; 16] = [
     "servo16_raw",
 ];
 
-/// The numbers of the messages that are decoded.
+/// Ids of the messages that are decoded.
 const READ: [u32; 17] = [
     messages::PARAM_VALUE_DATA::ID,
     messages::HEARTBEAT_DATA::ID,
@@ -104,9 +103,9 @@ const READ: [u32; 17] = [
     messages::WIND_COV_DATA::ID,
 ];
 
-/// Decodes a frame; `None` for messages without the flight's states or commands.
+/// Decodes a frame; `None` for a message that no reader of logs uses.
 pub fn read(frame: &Frame<'_>) -> Option<Logged> {
-    // Most messages of a log are not used, and decoding is the most expensive step of reading. The id is checked first.
+    // the id is checked before decoding, because most messages of a log are not used and decoding is slow
     READ.contains(&frame.id).then(|| decode(frame)).flatten().and_then(logged)
 }
 

@@ -1,4 +1,5 @@
-//! Flight modes in PX4's `custom_mode` encoding, and the heartbeat that contains them.
+//! Flight modes in MAVLink messages, with PX4's encoding of `custom_mode`: requests, the heartbeat and the list of modes. The
+//! base mode is MAVLink's set of flags that describe a mode without this encoding.
 
 use mavlink::dialects::ardupilotmega::{
     AVAILABLE_MODES_DATA, CURRENT_MODE_DATA, HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag,
@@ -22,7 +23,7 @@ pub enum ModeRequest {
     Unknown,
 }
 
-/// PX4's main and sub mode of a mode.
+/// The main mode and the sub mode by which PX4 encodes `mode`.
 fn numbers(mode: Mode) -> (u8, u8) {
     match mode {
         Mode::Manual => (1, 0),
@@ -33,13 +34,13 @@ fn numbers(mode: Mode) -> (u8, u8) {
     }
 }
 
-/// The `custom_mode` of a mode: main mode in bits 16 to 23, sub mode in bits 24 to 31.
+/// The `custom_mode` of `mode`: its main mode in bits 16 to 23, its sub mode in bits 24 to 31.
 pub fn custom_mode(mode: Mode) -> u32 {
     let (main, sub) = numbers(mode);
     u32::from(main) << 16 | u32::from(sub) << 24
 }
 
-/// The mode that SET_MODE requests with its base mode and custom mode.
+/// The mode that a SET_MODE with the base mode `base` and the `custom_mode` `custom` requests.
 pub fn from_set_mode(base: u8, custom: u32) -> ModeRequest {
     match base & CUSTOM {
         0 => from_base(base),
@@ -47,8 +48,8 @@ pub fn from_set_mode(base: u8, custom: u32) -> ModeRequest {
     }
 }
 
-/// The mode that DO_SET_MODE requests. PX4's clients send main and sub mode in two parameters. Other clients send the
-/// whole `custom_mode` in one. NaN counts as zero.
+/// The mode that a DO_SET_MODE requests. PX4's clients send the main mode and the sub mode in two parameters. Other clients send
+/// the whole `custom_mode` in the first of these. NaN counts as zero.
 pub fn from_do_set_mode(base: f64, main: f64, sub: f64) -> ModeRequest {
     let base = base as u32 as u8;
     match base & CUSTOM {
@@ -66,7 +67,7 @@ fn from_numbers(main: u8, sub: u8) -> ModeRequest {
     }
 }
 
-/// The mode for a base mode alone. Its most automatic flag has priority.
+/// The mode that a base mode requests without a `custom_mode`. Of several flags, the most automatic one decides.
 fn from_base(base: u8) -> ModeRequest {
     match base {
         b if b & 0b1100 != 0 => ModeRequest::Known(Mode::Hold),
@@ -86,7 +87,7 @@ fn base_mode(status: &Status) -> u8 {
     flags | CUSTOM | if status.armed { ARMED } else { 0 }
 }
 
-/// Content of a heartbeat. A change is sent immediately.
+/// The variable content of a heartbeat. If it changes, a heartbeat is sent at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pulse {
     base: u8,
@@ -115,7 +116,7 @@ pub enum Role {
     Onboard,
 }
 
-/// HEARTBEAT of a fixed-wing autopilot, or of an onboard computer, according to `role`.
+/// The HEARTBEAT message of this program in the role `role`.
 pub fn heartbeat(status: &Status, role: Role) -> Message {
     let pulse = Pulse::of(status);
     let state =
@@ -139,7 +140,7 @@ pub fn heartbeat(status: &Status, role: Role) -> Message {
     }))
 }
 
-/// AVAILABLE_MODES of mode `index`, counted from 1; 0 returns all modes. Empty if the index does not exist.
+/// The AVAILABLE_MODES message of mode number `index`, counted from 1, or of all modes for 0. Empty if there is no such mode.
 pub fn available_modes(index: usize) -> Vec<Message> {
     const AUTOMATIC: u32 = 4;
     let modes = [
@@ -163,7 +164,7 @@ pub fn available_modes(index: usize) -> Vec<Message> {
     (0..modes.len()).filter(wanted).map(message).collect()
 }
 
-/// CURRENT_MODE of this autopilot.
+/// The CURRENT_MODE message for `status`.
 pub fn current_mode(status: &Status) -> Message {
     let custom = custom_mode(status.mode);
     Message::coded(MavMessage::CURRENT_MODE(CURRENT_MODE_DATA {
@@ -194,7 +195,7 @@ mod tests {
 
     #[test]
     fn base_mode_alone_maps_to_the_nearest_mode() {
-        // MAV_MODE_MANUAL_ARMED, STABILIZE_ARMED, GUIDED_ARMED, AUTO_ARMED, PREFLIGHT.
+        // the values are MAV_MODE_MANUAL_ARMED, STABILIZE_ARMED, GUIDED_ARMED, AUTO_ARMED and PREFLIGHT
         assert_eq!(from_set_mode(192, 0), ModeRequest::Known(Mode::Manual));
         assert_eq!(from_set_mode(208, 0), ModeRequest::Known(Mode::Stabilized));
         assert_eq!(from_set_mode(216, 0), ModeRequest::Known(Mode::Hold));

@@ -1,4 +1,4 @@
-//! Messages that an offboard client sends to an autopilot, and messages that it receives.
+//! Messages between an autopilot and an offboard client, a program that commands attitudes in the mode OFFBOARD.
 
 use mavlink::dialects::ardupilotmega::{
     AttitudeTargetTypemask, COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavMessage,
@@ -47,7 +47,7 @@ pub enum Heard {
     Text(String),
 }
 
-/// The heartbeat of an offboard program.
+/// The heartbeat of an offboard client.
 pub fn heartbeat() -> Message {
     Message::coded(MavMessage::HEARTBEAT(HEARTBEAT_DATA {
         mavtype: MavType::MAV_TYPE_ONBOARD_CONTROLLER,
@@ -59,7 +59,7 @@ pub fn heartbeat() -> Message {
     }))
 }
 
-/// SET_ATTITUDE_TARGET with roll and pitch (rad) at yaw zero. Body rates and thrust are masked.
+/// SET_ATTITUDE_TARGET with roll and pitch (rad) and zero yaw. The mask tells the receiver to ignore body rates and thrust.
 pub fn attitude_target(to: Source, time_ms: u32, roll: f64, pitch: f64) -> Message {
     Message::coded(MavMessage::SET_ATTITUDE_TARGET(SET_ATTITUDE_TARGET_DATA {
         time_boot_ms: time_ms,
@@ -71,12 +71,12 @@ pub fn attitude_target(to: Source, time_ms: u32, roll: f64, pitch: f64) -> Messa
     }))
 }
 
-/// MAV_CMD_COMPONENT_ARM_DISARM that arms.
+/// The command to arm, MAV_CMD_COMPONENT_ARM_DISARM.
 pub fn arm(to: Source) -> Message {
     command(to, MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, [1.0, 0.0, 0.0])
 }
 
-/// MAV_CMD_DO_SET_MODE for a mode, in PX4's mode numbers.
+/// The command MAV_CMD_DO_SET_MODE for the mode `wanted`, with PX4's mode numbers.
 pub fn set_mode(to: Source, wanted: Mode) -> Message {
     let custom = mode::custom_mode(wanted);
     let [_, _, main, sub] = custom.to_le_bytes();

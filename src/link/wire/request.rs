@@ -7,7 +7,7 @@ use super::setpoint::{self, SetpointFault};
 use super::{Frame, decode};
 use crate::autopilot::{AttitudeSetpoint, ParameterValue, Sticks};
 
-/// Target of a message; 0 is a broadcast.
+/// System and component to which a message is addressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Recipient {
     /// System id; 0 for all systems.
@@ -54,7 +54,7 @@ pub enum MissionStep {
     List,
     /// Request for an item.
     Item,
-    /// Offer of items to upload.
+    /// Offer of items to upload, or an uploaded item.
     Upload,
     /// Request to delete all items.
     Clear,
@@ -77,7 +77,7 @@ pub enum Request {
     ParameterList,
     /// PARAM_REQUEST_READ by index or name.
     ParameterRead(ParameterKey),
-    /// PARAM_SET. The value is `None` for a type other than INT32 and REAL32.
+    /// PARAM_SET. The value is `None` if its type is neither INT32 nor REAL32.
     ParameterSet { name: ParameterName, value: Option<ParameterValue> },
     /// A mission message with its MAV_MISSION_TYPE.
     Mission { step: MissionStep, kind: u8 },
@@ -124,7 +124,8 @@ pub fn read(frame: &Frame<'_>) -> Option<(Recipient, Request)> {
     Some(found)
 }
 
-/// Decodes messages without enumeration fields. rust-mavlink rejects unknown enumeration values.
+/// Converts messages that rust-mavlink has decoded. Messages with enumeration fields are decoded by hand in `read`, because
+/// rust-mavlink rejects unknown enumeration values.
 fn coded(message: MavMessage) -> Option<(Recipient, Request)> {
     let to = |system: u8, component: u8| Recipient { system, component };
     Some(match message {
@@ -148,7 +149,7 @@ fn coded(message: MavMessage) -> Option<(Recipient, Request)> {
                 Request::File { sequence: body.u16(0), session: body.u8(2), opcode: body.u8(3) };
             (to(m.target_system, m.target_component), file)
         }
-        // a reply contains a time in tc1, a request zero
+        // a reply contains a time in tc1, a request contains zero
         MavMessage::TIMESYNC(m) if m.tc1 == 0 => {
             (to(m.target_system, m.target_component), Request::TimeSync { theirs: m.ts1 })
         }

@@ -1,12 +1,12 @@
-//! Decoding and validation of setpoints from clients.
+//! Decoding and validation of attitude setpoints and stick positions from clients.
 
 use mavlink::dialects::ardupilotmega::{MANUAL_CONTROL_DATA, SET_ATTITUDE_TARGET_DATA};
 
 use crate::autopilot::{AttitudeSetpoint, Sticks};
 
-/// Mask bit that marks the thrust as ignored.
+/// Bit of the setpoint's type mask that marks the thrust as ignored.
 const IGNORE_THRUST: u8 = 64;
-/// Mask bit that marks the attitude as ignored.
+/// Bit of the setpoint's type mask that marks the attitude as ignored.
 const IGNORE_ATTITUDE: u8 = 128;
 /// Norms of quaternions that are accepted and normalised. A quaternion outside this range is invalid.
 const NORM: std::ops::RangeInclusive<f64> = 0.1..=10.0;
@@ -15,14 +15,14 @@ const MAX_THRUST: f64 = 1.5;
 /// INT16_MAX marks an axis of MANUAL_CONTROL as invalid.
 const NO_AXIS: i16 = i16::MAX;
 
-/// Reason for which a setpoint is refused. A refused setpoint does not restart the offboard timeout.
+/// Reason for which a setpoint is refused. A refused setpoint does not restart the timeout of OFFBOARD.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SetpointFault {
     /// A value is NaN, infinite or out of range.
     NotFinite,
     /// The quaternion has a zero norm.
     NoAttitude,
-    /// The attitude is masked: only body rates or thrust are commanded.
+    /// The type mask ignores the attitude: only body rates or thrust are commanded.
     AttitudeMasked,
 }
 
@@ -48,8 +48,10 @@ fn thrust(sent: f32) -> Result<f64, SetpointFault> {
     }
 }
 
-/// Roll, pitch and yaw, rad, of a quaternion NED→FRD (w first). The quaternion may have either sign and a norm of
-/// 0.1..10.
+/// Roll, pitch and yaw, rad, of a quaternion NED→FRD (w first). Its sign does not matter, and its norm may be 0.1..10.
+///
+/// # Errors
+/// If a component is not finite or the norm is outside this range.
 pub fn euler(q: [f64; 4]) -> Result<(f64, f64, f64), SetpointFault> {
     if q.iter().any(|x| !x.is_finite()) {
         return Err(SetpointFault::NotFinite);
@@ -80,7 +82,7 @@ pub fn quaternion([roll, pitch, yaw]: [f64; 3]) -> [f64; 4] {
     ]
 }
 
-/// Stick positions; `None` if one of the three used axes is marked as invalid.
+/// Stick positions. `None` if roll, pitch or throttle is marked as invalid.
 pub(super) fn sticks(data: &MANUAL_CONTROL_DATA) -> Option<Sticks> {
     if [data.x, data.y, data.z].contains(&NO_AXIS) {
         return None;
@@ -99,7 +101,7 @@ mod tests {
 
     #[test]
     fn a_quaternion_and_its_negative_are_one_attitude() {
-        // Any attitude away from ±90° pitch. 1e-12 covers the rounding of a dozen operations.
+        // Any attitude away from ±90° pitch. The tolerance of 1e-12 covers the rounding of a dozen operations.
         let angles = [0.7, -0.3, 2.5];
         let q = quaternion(angles);
         for signed in [q, q.map(|c| -c), q.map(|c| 3.0 * c)] {

@@ -1,4 +1,5 @@
-//! Messages of the vehicle link in the `sitl` profile.
+//! Messages of the vehicle link in the `sitl` profile, the link to the simulator. Five messages of the simulator form a state
+//! frame. One message of the companion answers it.
 
 use mavlink::dialects::ardupilotmega::{
     HEARTBEAT_DATA, HIL_ACTUATOR_CONTROLS_DATA, MavAutopilot, MavMessage, MavModeFlag, MavState,
@@ -13,15 +14,15 @@ use greylag_physics::{Command, Time};
 /// Flag MAV_MODE_FLAG_SAFETY_ARMED of the base mode.
 const ARMED: u8 = 128;
 
-/// Least value of `active` with which a vehicle reports all surfaces and their travels.
+/// Smallest number of outputs in use (`active`) with which a vehicle reports all surfaces and their travels.
 const ALL: u32 = 15;
 
-/// Deflection at a normalised command of 1, rad, for a vehicle that does not report its travel. The value is that of
-/// the X8.
+/// Travel of the surfaces of a vehicle that does not report it: deflection at a normalised command of 1, rad. The value is that
+/// of the X8.
 #[expect(clippy::approx_constant, reason = "the simulator's stop is at 0.5235 rad, not at 30°")]
 pub const TRAVEL: f64 = 0.5235;
 
-/// A message from the vehicle in SI units, except for the normalised actuators.
+/// A message from the vehicle. Values are in SI units unless stated otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum VehicleMessage {
     /// Time and specific force of a state frame, from HIGHRES_IMU.
@@ -44,10 +45,11 @@ pub enum VehicleMessage {
         time: Time,
         /// Angle of attack, rad.
         alpha: f64,
-        /// Sideslip angle, rad.
+        /// Angle of sideslip, rad.
         beta: f64,
     },
-    /// ACTUATOR_OUTPUT_STATUS. Surface positions and rates are fractions of the larger of the surface's two travels.
+    /// Actuators from ACTUATOR_OUTPUT_STATUS. Surface positions and rates are divided by the larger one of the surface's two
+    /// travels.
     Actuators {
         /// Time of the state frame.
         time: Time,
@@ -56,7 +58,7 @@ pub enum VehicleMessage {
         /// Aileron, elevator and throttle positions, aileron and elevator rates (1/s), rudder position and rudder rate
         /// (1/s).
         outputs: [f64; 7],
-        /// Travels of the surfaces, rad.
+        /// Travels of the surfaces to each side, rad.
         travels: Travels,
     },
     /// ATTITUDE_QUATERNION, which completes a state frame.
@@ -65,7 +67,7 @@ pub enum VehicleMessage {
         boot_ms: u32,
         /// Attitude quaternion NED→FRD, w first.
         quaternion: [f64; 4],
-        /// p, q, r, rad/s.
+        /// Body rates p, q and r, rad/s.
         rates: [f64; 3],
     },
     /// Position and velocity from GLOBAL_POSITION_INT.
@@ -75,9 +77,9 @@ pub enum VehicleMessage {
         /// Velocity over ground, NED, m/s.
         velocity: [f64; 3],
     },
-    /// WIND_COV: velocity of the air, NED, m/s.
+    /// Wind from WIND_COV: velocity of the air, NED, m/s.
     Wind([f64; 3]),
-    /// HEARTBEAT of the vehicle.
+    /// A heartbeat of the vehicle.
     Heartbeat,
 }
 
@@ -118,8 +120,8 @@ pub fn read(frame: &Frame<'_>) -> Option<VehicleMessage> {
     })
 }
 
-/// Positions of aileron, elevator and throttle, rates of aileron and elevator, position and rate of the rudder. The
-/// rudder is 0 if it is not reported.
+/// Returns positions of aileron, elevator and throttle, rates of aileron and elevator, and position and rate of the rudder. The
+/// rudder's values are 0 if they are not reported.
 fn outputs(active: u32, actuator: &[f64; 32]) -> [f64; 7] {
     let rudder = if active >= ALL { [actuator[7], actuator[8]] } else { [0.0; 2] };
     let [a, e, t, ar, er] = std::array::from_fn(|i| actuator[i]);
@@ -144,7 +146,7 @@ fn travels(active: u32, actuator: &[f64; 32]) -> Travels {
     }
 }
 
-/// Actuator outputs of a tick.
+/// Actuator outputs for the reply to a state frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outputs {
     /// Disarmed: all outputs are zero.
@@ -156,8 +158,8 @@ pub enum Outputs {
 /// Index of the first control that commands an individual surface or motor.
 const OWN: usize = 4;
 
-/// HIL_ACTUATOR_CONTROLS in reply to the state frame of `time`. After the four controls come the commands of the
-/// individual surfaces and motors of `mixer`.
+/// HIL_ACTUATOR_CONTROLS in reply to the state frame of `time`. The first four controls are aileron, elevator, throttle and
+/// rudder. The commands of the individual surfaces and motors of `mixer` follow.
 pub fn actuator_controls(time: Time, outputs: Outputs, mixer: Option<&Mixer>) -> Message {
     let mut controls = [0.0; 16];
     let mut mode = 0;

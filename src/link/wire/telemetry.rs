@@ -1,4 +1,5 @@
-//! Telemetry streams to a client, built from the autopilot's status.
+//! Telemetry streams to a client (a ground station or an offboard program): messages that are built from the autopilot's status
+//! and sent at a fixed rate.
 
 use mavlink::dialects::ardupilotmega::{
     ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, ATTITUDE_TARGET_DATA, AttitudeTargetTypemask,
@@ -38,21 +39,22 @@ pub const STREAMS: [Stream; 14] = [
     stream(245, 1.0, 2),  // EXTENDED_SYS_STATE
     stream(24, 1.0, 2),   // GPS_RAW_INT
     stream(147, 1.0, 2),  // BATTERY_STATUS
-    stream(242, 0.5, 2),  // HOME_POSITION (MAVSDK waits for it without a request)
+    stream(242, 0.5, 2),  // HOME_POSITION (MAVSDK waits for it without requesting it)
     stream(2, 0.0, 12),   // SYSTEM_TIME
     stream(436, 0.0, 12), // CURRENT_MODE
     stream(NAMED_VALUE_FLOAT, 1.0, 12),
 ];
 
-/// Message id of NAMED_VALUE_FLOAT, which is sent once for each known residual and each known derivative.
+/// Message id of NAMED_VALUE_FLOAT. It is sent once for each known residual of the model monitor ([`Status::residuals`]) and
+/// once for each known derivative that was estimated in flight ([`Status::derivatives`]).
 pub const NAMED_VALUE_FLOAT: u32 = 251;
 
-/// Index of message `id` in [`STREAMS`]; `None` if it is not a stream.
+/// Index of the message `id` in [`STREAMS`]; `None` if it cannot be streamed.
 pub fn position(id: u32) -> Option<usize> {
     STREAMS.iter().position(|stream| stream.id == id)
 }
 
-/// A home position (HOME_POSITION).
+/// The home position, as in HOME_POSITION.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Home {
     /// Latitude and longitude, degrees.
@@ -61,10 +63,10 @@ pub struct Home {
     pub altitude: f64,
 }
 
-/// Inputs of the streams in addition to the status.
+/// Data that the stream messages contain in addition to the status.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scene {
-    /// Vehicle time.
+    /// Time of the vehicle's clock.
     pub now: Time,
     /// The home position; `None` until it is known.
     pub home: Option<Home>,
@@ -72,7 +74,7 @@ pub struct Scene {
     pub bad_frames: u64,
 }
 
-/// One NAMED_VALUE_FLOAT for each known residual and each known derivative.
+/// One NAMED_VALUE_FLOAT message for each known residual and each known derivative.
 pub fn named_values(status: &Status, scene: &Scene) -> impl Iterator<Item = Message> {
     let time_boot_ms = boot_ms(scene.now);
     let residuals = RESIDUALS.iter().zip(status.residuals);
@@ -87,7 +89,7 @@ pub fn named_values(status: &Status, scene: &Scene) -> impl Iterator<Item = Mess
     })
 }
 
-/// The stream message `id`; `None` if `id` is not a stream or its content is unknown.
+/// Builds the stream message `id`; `None` if `id` cannot be streamed, is [`NAMED_VALUE_FLOAT`], or has no known content.
 pub fn message(id: u32, status: &Status, scene: &Scene) -> Option<Message> {
     let built = match id {
         1 => sys_status(status, scene),
@@ -154,7 +156,8 @@ fn attitude_quaternion(status: &Status, scene: &Scene) -> Option<MavMessage> {
     }))
 }
 
-/// ATTITUDE_TARGET. Without a target the mask marks attitude and body rates as ignored.
+/// Builds ATTITUDE_TARGET. The type mask tells the receiver to ignore the body rates, and without a commanded attitude also the
+/// attitude.
 fn attitude_target(status: &Status, scene: &Scene) -> MavMessage {
     let yaw = if status.attitude[2].is_finite() { status.attitude[2] } else { 0.0 };
     let (attitude, mask) = match finite(status.target) {
@@ -170,7 +173,7 @@ fn attitude_target(status: &Status, scene: &Scene) -> MavMessage {
     })
 }
 
-/// Mask bits of ATTITUDE_TARGET_TYPEMASK that mark body rates, and the attitude, as ignored.
+/// Bits of ATTITUDE_TARGET_TYPEMASK that tell the receiver to ignore the body rates, and the attitude.
 const RATES_IGNORED: u8 = 0b111;
 const ATTITUDE_IGNORED: u8 = 1 << 7;
 
@@ -203,7 +206,7 @@ fn global_position(status: &Status, scene: &Scene) -> Option<MavMessage> {
     }))
 }
 
-/// A compass angle in 0.01°; 65535 if it is unknown.
+/// Converts an angle in degrees to 0.01° within 0 to 359.99°; 65535 if it is unknown.
 fn centidegrees(degrees: f64) -> u16 {
     match degrees.is_finite() {
         true => (degrees.rem_euclid(360.0) * 100.0) as u16 % 36000,
@@ -211,7 +214,7 @@ fn centidegrees(degrees: f64) -> u16 {
     }
 }
 
-/// A speed (m/s) in cm/s; 65535 if it is unknown.
+/// Converts a speed from m/s to cm/s; 65535 if it is unknown.
 fn centimetres_per_second(speed: f64) -> u16 {
     if speed.is_finite() { (speed * 100.0) as u16 } else { u16::MAX }
 }
@@ -256,8 +259,8 @@ fn servo_output(status: &Status, scene: &Scene) -> MavMessage {
 
 fn sys_status(status: &Status, scene: &Scene) -> MavMessage {
     type S = MavSysStatusSensor;
-    // the sensors behind the vehicle's estimate are all healthy or all unhealthy; the compass is included because
-    // MAVSDK's `health_all_ok` waits for it
+    // all sensors are reported healthy if the vehicle is alive, otherwise none; the compass is included because MAVSDK's
+    // `health_all_ok` waits for it
     let sensors = S::MAV_SYS_STATUS_SENSOR_3D_GYRO
         | S::MAV_SYS_STATUS_SENSOR_3D_ACCEL
         | S::MAV_SYS_STATUS_SENSOR_3D_MAG
@@ -269,7 +272,7 @@ fn sys_status(status: &Status, scene: &Scene) -> MavMessage {
         | S::MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
         | S::MAV_SYS_STATUS_AHRS
         | S::MAV_SYS_STATUS_PREARM_CHECK;
-    // There is no geofence, so it counts as healthy. MAVProxy reports a breach if this bit is missing.
+    // there is no geofence; its bit is set all the same, because MAVProxy reports a breach without it
     let fence = S::MAV_SYS_STATUS_GEOFENCE;
     let health = if status.vehicle_alive { sensors | fence } else { fence };
     MavMessage::SYS_STATUS(SYS_STATUS_DATA {
@@ -285,7 +288,7 @@ fn sys_status(status: &Status, scene: &Scene) -> MavMessage {
     })
 }
 
-/// BATTERY_STATUS with unknown values. The flight controller reports the battery on its own link.
+/// Builds BATTERY_STATUS with unknown values. The flight controller reports the battery on its own link.
 fn battery() -> MavMessage {
     MavMessage::BATTERY_STATUS(BATTERY_STATUS_DATA {
         current_consumed: -1,
@@ -298,7 +301,7 @@ fn battery() -> MavMessage {
     })
 }
 
-/// `MAV_LANDED_STATE`. An armed aircraft counts as in air, because there is no weight-on-wheels sensor.
+/// The MAV_LANDED_STATE. An armed aircraft counts as in the air, because there is no weight-on-wheels sensor.
 fn landed(status: &Status) -> MavLandedState {
     match (status.vehicle_alive, status.armed) {
         (_, true) => MavLandedState::MAV_LANDED_STATE_IN_AIR,
@@ -313,7 +316,7 @@ mod tests {
 
     #[test]
     fn a_speed_or_an_angle_that_is_not_known_is_not_sent_as_zero() {
-        // UINT16_MAX of GPS_RAW_INT.vel and .cog
+        // in the fields `vel` and `cog` of GPS_RAW_INT, 65535 means unknown
         assert_eq!([17.256, 0.0, f64::NAN].map(centimetres_per_second), [1725, 0, 65535]);
         assert_eq!([-90.0, f64::NAN].map(centidegrees), [27000, 65535]);
     }

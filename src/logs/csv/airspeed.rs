@@ -1,10 +1,10 @@
-//! True airspeed from the equivalent airspeed of a table.
+//! True airspeed from the equivalent airspeed of a log.
 
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, standard_density};
 
 use crate::Sample;
 
-/// Converts equivalent airspeed into true airspeed. Returns a note on the densities used.
+/// Converts the equivalent airspeed of `rows` into true airspeed. Returns a note on the densities used.
 ///
 /// Airspeed and density may be in different rows, so the last logged density is used. Without a logged density, the
 /// standard atmosphere gives the density at the last logged altitude, or at sea level.

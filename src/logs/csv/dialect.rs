@@ -1,11 +1,12 @@
-//! Names that other programs give to the columns of a table.
+//! Names that other programs give to the columns of a table of flight data.
 //!
 //! Sources: `FGOutputTextFile.cpp` of JSBSim (output sections and property names), the topics of PX4 as ulog2csv writes
 //! them, the records of ArduPilot and the messages of MAVLink as `mavlogdump --format csv` writes them (TYPE.field).
 
 use crate::mapping::{Mapping, table_rules};
 
-/// Another name for a column: the column, that name, and the factor to the column's unit.
+/// Another name for a column: name of the column in the log format, its name in files of another program, and the factor from
+/// the file's unit to the column's unit.
 struct Alias(&'static str, &'static str, f64);
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
@@ -13,7 +14,7 @@ const FOOT: f64 = 0.3048;
 /// One slug per cubic foot in kg/m³.
 const SLUG_PER_FOOT3: f64 = 515.378_8;
 
-/// JSBSim's own output, in degrees and feet, then its properties.
+/// JSBSim's names: first the headings of its output sections (degrees, feet), then the names of its properties.
 const JSBSIM: [Alias; 46] = [
     Alias("roll_rad", "Phi (deg)", DEGREE),
     Alias("pitch_rad", "Theta (deg)", DEGREE),
@@ -63,7 +64,7 @@ const JSBSIM: [Alias; 46] = [
     Alias("throttle_cmd", "fcs/throttle-cmd-norm[0]", 1.0),
 ];
 
-/// PX4's fields whose name has only one meaning, as ulog2csv writes them.
+/// Names of PX4's fields as ulog2csv writes them. Only names with a single meaning are included.
 const PX4: [Alias; 17] = [
     Alias("p_radps", "rollspeed", 1.0),
     Alias("q_radps", "pitchspeed", 1.0),
@@ -84,7 +85,8 @@ const PX4: [Alias; 17] = [
     Alias("throttle_cmd", "control[3]", 1.0),
 ];
 
-/// Names of the time column, with the unit in s. A unit of 0 is to be found from the steps.
+/// Names of the time column, with the unit in s. If the unit is given as 0, it is unknown and is determined from the time
+/// between rows.
 const TIMES: [(&str, f64); 12] = [
     ("Time", 1.0),
     ("timestamp", 0.0),
@@ -113,31 +115,32 @@ const QUATERNIONS: [[&str; 4]; 6] = [
 /// A column that the file has under another name.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Found {
-    /// The column of the log format.
+    /// Name of the column in the log format.
     pub column: String,
-    /// Name of the column in the file.
+    /// Its name in the file.
     pub field: String,
     /// Factor from the file's unit to the column's unit.
     pub scale: f64,
-    /// Offset that is added after the factor.
+    /// Offset that is added after the multiplication by `scale`.
     pub offset: f64,
 }
 
-/// Interpretation of the header names that are not column names of the log format.
+/// Meaning of those names in a header that are not column names of the log format.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Dialect {
-    /// The columns under other names.
+    /// The columns that the file has under other names.
     pub found: Vec<Found>,
     /// The quaternion's columns, w first unless the samples show another order.
     pub quaternion: Option<[String; 4]>,
-    /// Whether the unit of the time column is unknown and is to be found from its steps.
+    /// Whether the unit of the time column is unknown and must be determined from the time between rows.
     pub time_by_steps: bool,
-    /// Whether the airspeed is equivalent airspeed.
+    /// Whether the column read as airspeed contains equivalent airspeed.
     pub equivalent: bool,
 }
 
 impl Dialect {
-    /// Finds the columns that are neither in the header `names` nor in the mapping, under their other names.
+    /// Finds those columns of the log format that are neither in the header `names` nor in the mapping but have another name in
+    /// the header.
     pub fn of(names: &[String], mapping: &Mapping) -> Dialect {
         let has = |name: &str| names.iter().any(|n| n == name);
         let mut dialect = Dialect::default();
@@ -185,7 +188,7 @@ impl Dialect {
         self.found.push(found);
     }
 
-    /// Whether a column is read under another name, or computed from the quaternion.
+    /// Whether a column of the log format is read under another name or computed from the quaternion.
     pub fn fills(&self, column: &str) -> bool {
         let attitude = ["roll_rad", "pitch_rad", "yaw_rad"].contains(&column);
         self.quaternion.is_some() && attitude || self.found.iter().any(|f| f.column == column)
@@ -197,7 +200,7 @@ impl Dialect {
             || self.quaternion.as_ref().is_some_and(|q| q.iter().any(|n| n == name))
     }
 
-    /// Note on the columns that were found under other names.
+    /// Note for the user on the columns that were found under other names; `None` if there are none.
     pub fn said(&self) -> Option<String> {
         let mut parts: Vec<String> =
             self.found.iter().map(|f| format!("{} from {}", f.column, f.field)).collect();
@@ -206,7 +209,7 @@ impl Dialect {
     }
 }
 
-/// Unit of the time column, s, from its median step.
+/// Unit of the time column, s, from the median time between rows in this unit.
 pub(super) fn unit_of(step: f64) -> f64 {
     match step {
         s if s >= 5e6 => 1e-9,
@@ -216,8 +219,8 @@ pub(super) fn unit_of(step: f64) -> f64 {
     }
 }
 
-/// Seconds since 1970-01-01 UTC of a date and time in ISO 8601 (2026-11-27T07:42:01.25Z, 2026-11-27T09:42:01.25+02:00). A
-/// time without an offset is taken as UTC.
+/// Converts a date and time in ISO 8601 (2026-11-27T07:42:01.25Z, 2026-11-27T09:42:01.25+02:00) to seconds since 1970-01-01 UTC.
+/// A time without an offset is taken as UTC. `None` if the text has another form.
 pub(super) fn time(text: &str) -> Option<f64> {
     let (date, clock) = text.split_once(['T', ' '])?;
     let mut date = date.split('-').map(|part| part.parse::<i64>().ok());
@@ -240,7 +243,7 @@ pub(super) fn time(text: &str) -> Option<f64> {
     Some(days as f64 * 86_400.0 + hour * 3600.0 + minute * 60.0 + second - ahead_s)
 }
 
-/// Time by which a local clock is ahead of UTC, s, from its offset: ±hh:mm, ±hhmm or ±hh.
+/// Converts the offset of a local clock (±hh:mm, ±hhmm or ±hh) to the time by which it is ahead of UTC, s.
 fn offset_s(text: &str) -> Option<f64> {
     let (sign, digits) = match text.split_at_checked(1)? {
         ("+", digits) => (1.0, digits),

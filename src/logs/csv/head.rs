@@ -1,4 +1,5 @@
-//! The header of a table: the columns that its fields fill, and the parser of their numbers.
+//! The header of a CSV table. It tells which field of a row (a value of the file) fills which column of Greylag's log format.
+//! This file also parses the fields' numbers.
 
 use std::path::Path;
 
@@ -10,20 +11,21 @@ use crate::columns::{COLUMNS, EITHER, NEEDED, Place, index};
 use crate::mapping::{Entry, Mapping, TEXT};
 use crate::{Sample, mixed};
 
-/// Destination of a field: column, scale and offset, and whether the field is one term of a sum.
+/// Where a field goes: the column, the scale and offset of the conversion, and whether the field is one term of a sum.
 type Target = (Place, f64, f64, Share);
 
-/// Whether a field fills a column alone, or is one of several surfaces whose sum fills it.
+/// Whether a field alone fills a column. Otherwise the sum of several fields fills it, such as the elevons that act as an
+/// elevator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Share {
     Whole,
     OneOfSeveral,
 }
 
-/// Destinations of one field.
+/// The columns that one field fills.
 enum To {
     Nowhere,
-    /// A single column without scale and offset, which is the usual case.
+    /// A single column without conversion, which is the usual case.
     Column(Place),
     Targets(Vec<Target>),
 }
@@ -40,18 +42,18 @@ impl To {
     }
 }
 
-/// Destinations of the fields of a table.
+/// The columns that the fields of a table fill.
 pub(super) struct Head {
     fields: Vec<To>,
-    /// Columns of the file whose names are not those of the log format.
+    /// Fields that were recognised although their names are not those of the log format.
     pub dialect: Dialect,
-    /// Indices of the fields of a quaternion, if the table has one.
+    /// Indices of the four fields of the attitude quaternion, if the table has one.
     quaternion: Option<[usize; 4]>,
     decimal: Decimal,
 }
 
 impl Head {
-    /// Finds the destinations of fields with these `names`. Also returns the table, which has no rows yet.
+    /// Finds the columns that the fields `names` fill. Also returns a table without rows that holds the notes on the header.
     pub fn of(names: &[String], delimiter: u8, path: &Path, mapping: &Mapping) -> (Head, Raw) {
         let dialect = Dialect::of(names, mapping);
         let mut targets: Vec<Vec<Target>> =
@@ -78,9 +80,10 @@ impl Head {
         (Head { fields, dialect, quaternion, decimal }, table)
     }
 
-    /// The sample in a record; `None` if one of its fields is not a number, or the time is missing.
+    /// The sample in a row of the file. `None` if the row has too few fields, a field that is used is not a number, or the time
+    /// is missing. An empty field is NaN.
     pub fn sample(&self, record: Fields<'_>) -> Option<Sample> {
-        // A row that lacks fields is damaged, and its sample would take many times its size in memory.
+        // a row with too few fields is damaged; its sample would also need much more memory than the row
         if record.len() < self.fields.len() {
             return None;
         }
@@ -103,14 +106,14 @@ impl Head {
         sample.time_s.is_finite().then_some(sample)
     }
 
-    /// The components of the quaternion in a record, if the table has one.
+    /// The components of the attitude quaternion in a row; `None` if the table has no quaternion.
     pub fn quaternion(&self, record: Fields<'_>) -> Option<[f64; 4]> {
         let part = |i| record.get(i).and_then(|f| number(f, self.decimal)).unwrap_or(f64::NAN);
         self.quaternion.map(|q| q.map(part))
     }
 }
 
-/// Writes the number of a field into its column.
+/// Converts the number `x` of a field and writes it into its column, or adds it there.
 fn put((place, scale, offset, share): &Target, x: f64, sample: &mut Sample) {
     let value = if (*scale, *offset) == (1.0, 0.0) { x } else { x * scale + offset };
     let place = place(sample);
@@ -125,7 +128,8 @@ enum Decimal {
     PointOrComma,
 }
 
-/// The number in a field. NaN if it is empty, `None` if it is neither a number nor a date.
+/// The number in a field. A date is converted to a time in s. NaN if the field is empty; `None` if it is neither a number nor a
+/// date.
 fn number(field: &[u8], decimal: Decimal) -> Option<f64> {
     if let Some(x) = short(field) {
         return Some(x);
@@ -146,8 +150,8 @@ fn number(field: &[u8], decimal: Decimal) -> Option<f64> {
 const TENS: [f64; 16] =
     [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
 
-/// Reads a number of at most 15 digits without an exponent, which most fields hold; `None` for another text.
-/// Numerator and denominator are exact, so their quotient is the number nearest to the decimal one (Clinger 1990).
+/// Reads a number of at most 15 digits without an exponent; `None` for any other text. Most fields hold such a number. It is
+/// the quotient of an integer and a power of ten. Both are exact in `f64`, so the quotient is correctly rounded (Clinger 1990).
 fn short(field: &[u8]) -> Option<f64> {
     let (sign, digits) = match field {
         [b'-', rest @ ..] => (-1.0, rest),
@@ -183,7 +187,7 @@ fn short(field: &[u8]) -> Option<f64> {
     (1..TENS.len()).contains(&count).then(|| sign * (whole as f64 / TENS[behind]))
 }
 
-/// Reads eight digits as a number (Lemire, "Quickly parsing eight digits"). `None` if one of them is not a digit.
+/// Reads a number of eight digits (Lemire, "Quickly parsing eight digits"). `None` if a character is not a digit.
 fn eight(digits: [u8; 8]) -> Option<u64> {
     const ZEROS: u64 = 0x3030_3030_3030_3030;
     const ABOVE: u64 = 0x4646_4646_4646_4646;
@@ -193,13 +197,13 @@ fn eight(digits: [u8; 8]) -> Option<u64> {
     if (letters.wrapping_add(ABOVE) | values) & HIGH != 0 {
         return None;
     }
-    // Pairs of digits, then pairs of pairs, then both halves.
+    // combines digits to numbers of two digits, these to numbers of four, and these to the whole number
     let pairs = (10 * values + (values >> 8)) & 0x00FF_00FF_00FF_00FF;
     let fours = (100 * pairs + (pairs >> 16)) & 0x0000_FFFF_0000_FFFF;
     Some((10_000 * fours + (fours >> 32)) & 0xFFFF_FFFF)
 }
 
-/// Destinations of the file's column `name`.
+/// The columns that the field `name` of the file fills.
 fn targets(name: &str, mapping: &Mapping, dialect: &Dialect) -> Vec<Target> {
     let mut targets: Vec<Target> = mapping
         .of_topic(TEXT)
@@ -221,7 +225,7 @@ fn targets(name: &str, mapping: &Mapping, dialect: &Dialect) -> Vec<Target> {
     targets
 }
 
-/// Note on the fields that the mapping names and the table does not have.
+/// A note on the fields that the mapping file names and the table does not have; `None` if it has all.
 fn lacking(names: &[String], mapping: &Mapping) -> Option<String> {
     let lacks = |field: &String| !names.contains(field);
     let columns = mapping.of_topic(TEXT).filter(|(_, entry)| lacks(&entry.field));
@@ -235,7 +239,7 @@ fn lacking(names: &[String], mapping: &Mapping) -> Option<String> {
     })
 }
 
-/// The required columns that are not among `names`, each with a remedy.
+/// An error with a remedy for each required column that no field in `names` fills.
 fn missing_columns(names: &[String], mapping: &Mapping, path: &Path) -> Vec<CsvError> {
     let has = |column: &str| {
         let name = mapping.get(column).map_or(column, |entry| &entry.field);

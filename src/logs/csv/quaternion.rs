@@ -1,4 +1,4 @@
-//! Attitude from a quaternion in a table, with its scalar component first or last.
+//! Attitude from a quaternion in a table. The scalar component may be the first or the last one.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 

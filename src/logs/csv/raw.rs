@@ -1,4 +1,5 @@
-//! A table as read from its file, before unusable rows are dropped.
+//! A CSV table as read from its file, before unusable rows are dropped. Of a long table, an inspection keeps only stretches of
+//! rows, with statistics of the whole table.
 
 use std::io::BufRead;
 use std::path::Path;
@@ -19,38 +20,38 @@ use crate::stretches::{Keep, Stretches};
 use crate::topics::period_s;
 use crate::{Sample, rows};
 
-/// A table as read from its file, before unusable rows are dropped.
+/// A CSV table as read from its file, before unusable rows are dropped.
 #[derive(Default)]
 pub(crate) struct Raw {
-    /// The rows that could be read and have a time.
+    /// The rows that could be parsed and that have a time.
     pub rows: Vec<Sample>,
-    /// Number of the file's rows before each row.
+    /// For each of `rows`: the number of rows that precede it in the file, without the header.
     pub(super) places: Vec<usize>,
-    /// Numbers of the file's rows before each row that could not be read.
+    /// The same number for each row that could not be parsed.
     pub(super) unreadable: Vec<usize>,
-    /// The required columns that the table lacks.
+    /// One error for each required column that the table lacks.
     pub missing: Vec<CsvError>,
     pub(crate) unknown_columns: Vec<String>,
     pub(super) cut_short: bool,
-    /// Notes on columns that were found under other names.
+    /// Notes for the user, for instance on columns that were found under other names.
     pub notes: Vec<String>,
-    /// Statistics of the whole table, if only stretches of it are kept.
+    /// Statistics of the whole table; `None` if the whole table is kept.
     pub(crate) whole: Option<Whole>,
 }
 
-/// Backward jump of time above which another recording may begin: in median sample periods, and in s.
+/// Backward jump of time above which another recording may begin: the larger of `BACK_PERIODS` sample periods and `BACK_S`, s.
 const BACK_PERIODS: f64 = 10.0;
 const BACK_S: f64 = 1.0;
-/// The first time of a new recording lies within this fraction of the previous recording's time span, counted from
-/// the start of that span.
+/// A new recording starts at a time within the first part of the previous recording's time span. This is the size of that part,
+/// as a fraction of the span.
 const BEGINS: f64 = 0.1;
-/// Smallest number of rows of a recording.
+/// Smallest number of rows that form a recording.
 const RECORDING: usize = 50;
 
 impl Raw {
-    /// Calls `judge` for every row, also for those that could not be read (`None`). `judge` gets the row's number,
-    /// the row and the rows kept before it, and returns the row if it is usable. The kept rows stay in place, because
-    /// a copy of a long table is large.
+    /// Calls `judge` for every row, also for those that could not be parsed (`None`). `judge` gets the row's number in the file
+    /// (the header is row 1), the row and the rows kept so far. It returns the row if it is usable. The result has the kept rows.
+    /// They are moved within the same memory, because a copy of a long table would be large.
     pub(super) fn judged(
         &mut self,
         judge: impl Fn(&mut rows::Rows, usize, Option<Sample>, &[Sample]) -> Option<Sample>,
@@ -59,7 +60,7 @@ impl Raw {
         let mut all = std::mem::take(&mut self.rows);
         let mut unreadable = self.unreadable.iter().peekable();
         let mut kept = 0;
-        // The header is row 1.
+        // a row with no row before it has the number 2, because the header is row 1
         for (i, place) in self.places.iter().enumerate() {
             while let Some(i) = unreadable.next_if(|i| *i < place) {
                 judge(&mut rows, i + 2, None, &all[..kept]);
@@ -77,7 +78,7 @@ impl Raw {
         rows
     }
 
-    /// Leaves out rows deliberately; they do not count as dropped.
+    /// Removes the rows for which `is` holds. They do not count as dropped.
     pub fn leave_out(&mut self, is: impl Fn(&Sample) -> bool) {
         if self.rows.iter().any(&is) {
             let places = std::mem::take(&mut self.places);
@@ -86,8 +87,8 @@ impl Raw {
         }
     }
 
-    /// Times (s) of the last row before and of the first row after each place at which rows are left out between
-    /// stretches.
+    /// For each place at which rows between two kept stretches are left out: the times (s) of the last row before it and of the
+    /// first row after it.
     fn pauses(&self) -> impl Iterator<Item = (f64, f64)> {
         let pairs = self.rows.windows(2).zip(self.places.windows(2));
         let left_out =
@@ -100,27 +101,28 @@ impl Raw {
         self.pauses().map(|(from, to)| 1.01 * (to - from)).fold(0.0, f64::max)
     }
 
-    /// Stretches of the table with statistics of the whole, if only stretches of it are kept.
+    /// Description of the kept stretches and of the whole table; `None` if the whole table is kept.
     pub fn stretches(&self, flies: &Flying) -> Option<Stretches> {
         let times: Vec<f64> = self.rows.iter().map(|s| s.time_s).collect();
         self.whole.as_ref()?.stretches(period_s(&times), flies)
     }
 
-    /// Extends the statistics of a channel from the stretches to the whole table.
+    /// Sets the number of samples and the largest gap of `channel` to those of the whole table. `stretches` describes the kept
+    /// part.
     pub fn of_all(&self, stretches: &Stretches, channel: &mut Channel) {
         let share = self.rows.len() as f64 / stretches.rows.max(1) as f64;
         channel.samples = (channel.samples as f64 / share).round() as usize;
         channel.largest_gap_s = self.whole.as_ref().map_or(0.0, |whole| whole.watch.largest_gap_s);
     }
 
-    /// Intervals (from, to, s) of the whole table in which a column is frozen. Its kept values are `values` at
-    /// `times` (s). `None` if the whole table is kept.
+    /// Intervals (from, to, s) of the whole table in which the column `column` is frozen (constant). Its kept values are `values`
+    /// at the times `times` (s). `None` if the whole table is kept or there is no such column.
     pub fn frozen(&self, column: &str, times: &[f64], values: &[f64]) -> Option<Vec<(f64, f64)>> {
         let (whole, place) = (self.whole.as_ref()?, index(column)?);
         Some(frozen_of(column, times, values, whole.watch.stays(place)))
     }
 
-    /// The successive recordings in the table. A recording begins where the time goes back and stays there.
+    /// Splits the table into its successive recordings. A recording begins where the time jumps back and does not return.
     pub fn recordings(self) -> Vec<Raw> {
         let times: Vec<f64> = self.rows.iter().map(|s| s.time_s).collect();
         let back = (BACK_PERIODS * period_s(&times)).max(BACK_S);
@@ -128,7 +130,7 @@ impl Raw {
         for i in 1..times.len() {
             let whole = i - bounds[bounds.len() - 1] >= RECORDING && times.len() - i >= RECORDING;
             let goes_back = times[i] < times[i - 1] - back;
-            // A corrected clock jumps back by some seconds; a new recording starts again near the first time.
+            // a clock that is set right jumps back by some seconds, but a new recording starts near the first time
             let start = times[bounds[bounds.len() - 1]];
             let begins = times[i] < start + (BEGINS * (times[i - 1] - start)).max(back);
             let stays = || times[i..i + RECORDING].iter().all(|t| *t < times[i - 1] - 0.5 * back);
@@ -161,12 +163,13 @@ impl Raw {
     }
 }
 
-/// Reads the rows of a table. `mapping` may assign columns with other names or units.
+/// Reads all rows of the CSV text `bytes`. `mapping` may assign columns with other names or units.
 pub(crate) fn raw(bytes: &[u8], path: &Path, mapping: &Mapping) -> Result<Raw, CsvError> {
     read(&mut &bytes[..], path, mapping, Keep::All)
 }
 
-/// Reads the rows of a table. `mapping` may assign columns with other names or units.
+/// Reads the rows of a CSV table, or only stretches of them, as `keep` states. `mapping` may assign columns with other names or
+/// units.
 pub(crate) fn read(
     source: &mut dyn BufRead,
     path: &Path,
@@ -181,7 +184,7 @@ pub(crate) fn read(
     let names: Vec<String> = (0..count).filter_map(name).map(|n| n.trim().to_owned()).collect();
     let (head, mut out) = Head::of(&names, records.delimiter, path, mapping);
     let mut quaternions: Vec<[f64; 4]> = Vec::new();
-    // Gaps are found by times. A table whose time unit is not known yet is therefore kept whole.
+    // stretches need gaps, which are found by times in seconds: a table whose time unit is not known yet is kept whole
     let mut thin = Thin::new(if head.dialect.time_by_steps { Keep::All } else { keep });
     let mut number = 0;
     while let Some(record) = records.next().map_err(text)? {
@@ -194,7 +197,7 @@ pub(crate) fn read(
                 quaternions.extend(head.quaternion(record));
             }
             Some(_) => {}
-            // A quote that is not closed draws the lines after it into its record. Each of these lines is lost.
+            // a quote that is not closed makes the following lines part of its record: each of these lines is lost
             None => {
                 let lines = record.lines();
                 out.unreadable.extend(number..number + lines);
@@ -211,7 +214,7 @@ pub(crate) fn read(
     }
     out.cut_short = records.cut_short();
     out.whole = thin.whole();
-    // The order of a quaternion's components is found from body rates, which need times in seconds.
+    // times are converted first: the order of a quaternion's components follows from body rates in rad/s
     if head.dialect.time_by_steps {
         in_seconds(&mut out.rows);
     }
@@ -226,7 +229,7 @@ pub(crate) fn read(
     Ok(out)
 }
 
-/// Converts times to seconds. Their unit follows from their steps.
+/// Converts the times of `rows` to seconds. Their unit is guessed from the median step.
 fn in_seconds(rows: &mut [Sample]) {
     let times: Vec<f64> = rows.iter().map(|s| s.time_s).collect();
     let unit = dialect::unit_of(period_s(&times));

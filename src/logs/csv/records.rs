@@ -1,11 +1,11 @@
-//! Reads the records of a table line by line. Most tables have no quotes, so their fields are read without a copy.
+//! Reads the records of a CSV table line by line. Fields of a table without quotes are read without a copy.
 
 use std::io::{self, BufRead, Cursor, Read};
 use std::ops::Range;
 
 use memchr::{memchr_iter, memchr2};
 
-/// Whole lines of a source. A last line without its end is left out, because it may lack digits.
+/// Whole lines of a source. A last line without a line end is left out, because it may lack digits.
 pub(super) struct Lines<'a> {
     source: &'a mut dyn BufRead,
     line: Vec<u8>,
@@ -19,7 +19,7 @@ impl<'a> Lines<'a> {
         Lines { source, line: Vec::new(), from: 0, cut_short: false }
     }
 
-    /// Reads the next line, with its end; `false` after the last one.
+    /// Reads the next line with its line end. Returns `false` after the last line.
     fn next(&mut self) -> io::Result<bool> {
         self.line.clear();
         self.from = 0;
@@ -49,8 +49,8 @@ type Quoted<'a> = ::csv::Reader<io::Chain<Cursor<Vec<u8>>, Lines<'a>>>;
 /// Source of the records.
 enum Origin<'a> {
     Plain(Lines<'a>),
-    /// A reader that handles quotes. It is used from the first line that has a quote, or a carriage return within the
-    /// line.
+    /// A reader that handles quotes. It is used from the first line that contains a quote, or a carriage return before
+    /// its end.
     Quoted(Box<Quoted<'a>>),
     /// No source, after an error.
     Nothing,
@@ -70,7 +70,7 @@ pub(super) struct Records<'a> {
 #[derive(Clone, Copy)]
 pub(super) struct Fields<'a> {
     bytes: &'a [u8],
-    /// End of each field in `bytes`. The next field begins `between` bytes after it.
+    /// Index in `bytes` of the end of each field. The next field begins `between` bytes later.
     ends: &'a [usize],
     between: usize,
 }
@@ -101,7 +101,8 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// Separator of a table's columns: a comma, else a semicolon or a tab, whichever is more frequent.
+/// Separator of a table's columns, from its first line: a comma if it is at least as frequent as the semicolon, else the more
+/// frequent of semicolon and tab. A comma if there is none of the three.
 fn separator(header: &[u8]) -> u8 {
     let count = |by: u8| header.iter().filter(|b| **b == by).count();
     if count(b',') > 0 && count(b';') <= count(b',') {
@@ -144,7 +145,8 @@ impl<'a> Records<'a> {
         Ok(Some(Fields { bytes: self.record.as_slice(), ends: &self.ends, between: 0 }))
     }
 
-    /// Reads the next line that is not empty and has no quote. Returns its range in the line buffer.
+    /// Reads the next line that is not empty and returns its range in the line buffer. Returns `None` at the end, and from the
+    /// first line on that needs the reader for quotes.
     fn plain(&mut self) -> Result<Option<Range<usize>>, ::csv::Error> {
         while let Origin::Plain(lines) = &mut self.from {
             if !lines.next()? {
@@ -173,7 +175,7 @@ impl<'a> Records<'a> {
         Ok(None)
     }
 
-    /// Passes the present line and the following ones to a reader that handles quotes.
+    /// Hands the present line and all following ones to a reader that handles quotes.
     fn quoted(&mut self) {
         if let Origin::Plain(mut lines) = std::mem::replace(&mut self.from, Origin::Nothing) {
             let line = Cursor::new(std::mem::take(&mut lines.line));
@@ -204,7 +206,7 @@ fn content(line: &[u8]) -> &[u8] {
 mod tests {
     use super::*;
 
-    /// The records from this reader, and from one that handles quotes from the beginning on.
+    /// The records as [`Records`] reads them, and as the reader that handles quotes reads the whole text.
     fn both(text: &[u8]) -> [Vec<Vec<Vec<u8>>>; 2] {
         let mut source = io::BufReader::with_capacity(7, text);
         let mut records = Records::new(&mut source);

@@ -1,4 +1,5 @@
-//! Stretches of a long table. An inspection parses every row but keeps only those in the stretches.
+//! Limits the memory for a long table. An inspection parses every row, but keeps only the rows in some stretches: blocks of
+//! consecutive rows at regular intervals.
 
 use crate::Sample;
 use crate::columns::COLUMNS;
@@ -7,9 +8,9 @@ use crate::stretches::{Keep, Level, MOST, Stretches, Watch};
 
 /// Number of rows in a stretch.
 pub(super) const STRETCH: usize = 4096;
-/// For the phases of the whole table, one airspeed in this number of rows is kept.
+/// One airspeed in this number of rows is kept of the whole table. Flight and ground phases are found from these airspeeds.
 const COARSE: usize = 16;
-/// Backward step of the time at which another recording may begin, s.
+/// A backward step of the time by more than this may be the start of another recording, s.
 const BACK_S: f64 = 1.0;
 
 /// Selection of the rows of a long table.
@@ -40,7 +41,7 @@ impl Thin {
             return;
         }
         if row.time_s < self.last_s - BACK_S {
-            // Another recording may begin. Its first rows decide this, so all further rows are kept.
+            // Another recording may begin. Its first rows are needed to decide this, so all further rows are kept.
             self.keep = Keep::All;
         }
         self.last_s = row.time_s;
@@ -52,7 +53,7 @@ impl Thin {
         }
     }
 
-    /// Whether more `rows` are kept than the limit. If so, half of the stretches are no longer selected.
+    /// Returns whether `rows`, the number of kept rows, exceeds the limit. If so, deselects every second stretch.
     pub fn is_full(&mut self, rows: usize) -> bool {
         let fewer = (self.keep == Keep::Stretches && rows > MOST).then(|| self.level.halved());
         self.level = fewer.flatten().unwrap_or(self.level);
@@ -80,7 +81,7 @@ pub(crate) struct Whole {
 }
 
 impl Whole {
-    /// The stretches, with the phases of the whole table. `period` is the time between two rows, s.
+    /// Description of the stretches, with the phases of the whole table. `period` is the time between two rows, s.
     pub(crate) fn stretches(&self, period: f64, flies: &Flying) -> Option<Stretches> {
         let (from, to) = self.watch.span_s?;
         let airspeeds: Vec<Sample> = self

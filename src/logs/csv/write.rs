@@ -7,11 +7,10 @@ use super::CsvError;
 use crate::columns::COLUMNS;
 use crate::{Flight, Sample};
 
-/// Writes `flight` to `out`. Missing values become empty fields; numbers are written so that they
-/// read back to the bit.
+/// Writes `flight` to `out`. Missing values become empty fields. Numbers have enough digits to be read back without rounding.
 ///
 /// # Errors
-/// The error of `out`.
+/// If `out` cannot be written.
 pub fn write(flight: &Flight, out: impl Write) -> std::io::Result<()> {
     let mut rows = Rows::new(out, &[])?;
     flight.samples.iter().try_for_each(|sample| rows.row(sample, &[]))?;
@@ -21,7 +20,7 @@ pub fn write(flight: &Flight, out: impl Write) -> std::io::Result<()> {
 /// Writes `flight` to a new file.
 ///
 /// # Errors
-/// The file exists, or cannot be written.
+/// If the file exists or cannot be written.
 pub fn save(flight: &Flight, path: &Path) -> Result<(), CsvError> {
     let fail = |doing| move |source| CsvError::File { doing, path: path.to_owned(), source };
     let file = std::fs::File::create_new(path).map_err(fail("create"))?;
@@ -36,20 +35,20 @@ pub struct Rows<W: Write> {
 }
 
 impl<W: Write> Rows<W> {
-    /// Writes the header: the columns of the format, then `extra`.
+    /// Writes the header: the columns of the log format, then `extra`.
     ///
     /// # Errors
-    /// The error of `out`.
+    /// If `out` cannot be written.
     pub fn new(mut out: W, extra: &[&str]) -> std::io::Result<Self> {
         let names: Vec<&str> = COLUMNS.iter().map(|c| c.0).chain(extra.iter().copied()).collect();
         writeln!(out, "{}", names.join(","))?;
         Ok(Rows { out, line: String::with_capacity(512) })
     }
 
-    /// Writes a sample, then the extra fields (free of commas and quotes) in the header's order.
+    /// Writes a sample, then the fields `extra` in the header's order. They must not contain commas or quotes.
     ///
     /// # Errors
-    /// The error of the writer.
+    /// If the writer cannot be written.
     pub fn row(&mut self, sample: &Sample, extra: &[&str]) -> std::io::Result<()> {
         use std::fmt::Write as _;
         self.line.clear();
@@ -73,7 +72,7 @@ impl<W: Write> Rows<W> {
     /// Flushes the writer.
     ///
     /// # Errors
-    /// The error of the writer.
+    /// If the writer cannot be flushed.
     pub fn flush(&mut self) -> std::io::Result<()> {
         self.out.flush()
     }

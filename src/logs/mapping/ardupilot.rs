@@ -1,7 +1,7 @@
-//! Rules from ArduPilot's DataFlash records to the columns of the table.
+//! Rules by which ArduPilot's DataFlash records fill the columns of the table.
 //!
-//! Not mapped: V-tails, differential spoilers, several motors, and the wind of XKF2, for which the log format has no
-//! column.
+//! Differential spoilers and the wind of XKF2 are not mapped. V-tails and several motors are mapped only by the mixer of the
+//! airframe file.
 
 use super::rule::Rule;
 use super::servos;
@@ -17,7 +17,7 @@ pub const TOPICS: [&str; 13] = [
 /// Value of AETR at full deflection, centidegrees.
 const FULL: f64 = 4500.0;
 
-/// The rules, preferred ones first.
+/// The rules. If several rules fill the same column, the first one is preferred.
 pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
     let degree = 1_f64.to_radians();
     let mut out = Vec::new();

@@ -1,4 +1,5 @@
-//! Rotation of a log into body axes, if its axes are those of an autopilot's board or of motion-capture markers.
+//! Rotation of a log into the aircraft's body axes. It is needed if the log was recorded in other axes: those of an autopilot's
+//! board, or those of motion-capture markers.
 
 use std::fmt;
 
@@ -7,18 +8,18 @@ use serde::Deserialize;
 
 use crate::Sample;
 
-/// Orientation of the sensor board in the body, `[board]` in a mapping:
+/// Orientation of the sensor board in the body. The section `[board]` of a mapping file states it:
 ///
 /// ```toml
 /// [board]
 /// roll_deg = 0.0
 /// pitch_deg = -9.0       # the board's nose is 9° below the body's
 /// yaw_deg = 0.0
-/// airflow = "board"      # alpha and beta refer to the board too (motion capture); "body" (default): vanes
+/// airflow = "board"      # axes of alpha and beta: "board" (from motion capture) or "body" (default, from vanes)
 /// ```
 ///
-/// The three angles (ZYX, as PX4's SENS_BOARD_X_OFF to Z_OFF) rotate the body's axes into the board's. Attitude, body
-/// rates and specific force of the log are rotated back into body axes.
+/// The three Euler angles (order ZYX, as PX4's SENS_BOARD_X_OFF to SENS_BOARD_Z_OFF) rotate the body axes into the board's axes.
+/// Attitude, body rates and specific force of the log are rotated back into body axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Board {
     degrees: [f64; 3],
@@ -64,13 +65,13 @@ impl TryFrom<WrittenBoard> for Board {
 }
 
 impl Board {
-    /// Rotates a row from the board's axes into body axes.
+    /// Rotates the quantities of `row` from the board's axes into body axes.
     pub(crate) fn turn(&self, row: &mut Sample) {
         let body = |x: [f64; 3]| (self.to_body * Vector3::from(x)).into();
         row.rates_radps = body(row.rates_radps);
         row.specific_force_mps2 = body(row.specific_force_mps2);
         let [roll, pitch, yaw] = row.attitude_rad;
-        // without a heading the attitude is rotated with a heading of zero, and no heading is computed
+        // without a heading, zero is used for the rotation, and the result has no heading
         let heading = if yaw.is_finite() { yaw } else { 0.0 };
         let seen = Rotation3::from_euler_angles(roll, pitch, heading);
         let (roll, pitch, turned) = (seen * self.to_body.inverse()).euler_angles();
@@ -100,7 +101,7 @@ mod tests {
         let written: WrittenBoard =
             toml::from_str("pitch_deg = -9.0\nairflow = \"board\"").unwrap();
         let board = Board::try_from(written).unwrap();
-        // level flight at α = 4°, rolling at 1 rad/s about the body's x; the board shows it in its own axes
+        // level flight at α = 4° with a roll rate of 1 rad/s about the body x axis, expressed in the board's axes
         let nine = 9f64.to_radians();
         let mut row = Sample {
             attitude_rad: [0.0, 4f64.to_radians() - nine, 0.3],

@@ -1,4 +1,4 @@
-//! Rules from MAVROS's topics to the columns of the table.
+//! Rules that assign the fields of MAVROS's topics (ROS messages) to the columns of a log.
 //!
 //! MAVROS publishes in body axes forward-left-up (FLU) and earth axes east-north-up (ENU). The velocity over ground
 //! (`local_position/velocity_local`) is in earth axes although its `frame_id` names the body. The airspeed of

@@ -1,6 +1,6 @@
-//! Mapping from the topics of a log to the columns of the table.
+//! Mapping from the topics of a log to the columns of the table. A topic is a kind of message or record.
 //!
-//! Each binary format has rules in order of preference; a mapping file overrides them by column:
+//! For each binary format there are built-in rules in order of preference. A mapping file replaces them for single columns:
 //!
 //! ```toml
 //! schema = 1
@@ -13,12 +13,14 @@
 //! `[attitude] quaternion = ["csv.qx", "csv.qy", "csv.qz", "csv.qw"]` derives roll, pitch and yaw from a quaternion
 //! of earth axes NED to body axes FRD; `order = "wxyz"` or `"xyzw"` states whether w is first or last.
 //!
-//! A column's value is scale × field + offset. `instance` is the topic's number (ULog, DataFlash, ROS bag) or
-//! system/component (telemetry log). With `rate_over_s` the column is the rate of change of the field: the slope of a
-//! parabola fitted to the rows within that many seconds. `[derive] body_rates_over_s` computes p, q, r from roll,
-//! pitch and yaw in the same way. `[board]` rotates the axes of a log (see [`Board`]). `[flight]` sets the criteria
-//! for flight: `from_mps` (airspeed; a model's envelope takes precedence) and `shortest_s` (at least 0.5 s).
-//! `[sensors]` describes sensors and wind, see [`Sensors`].
+//! A column's value is scale × field + offset. `instance` selects one of several sources of a topic: by its number (ULog,
+//! DataFlash, ROS bag) or by system/component (telemetry log). With `rate_over_s` the column is the rate of change of the field:
+//! the slope of a parabola fitted to the rows within that many seconds. `[derive] body_rates_over_s` computes p, q, r from roll,
+//! pitch and yaw in the same way. `[board]` rotates the axes of a log, see [`Board`]. `[sensors]` describes sensors and wind, see
+//! [`Sensors`].
+//!
+//! `[flight]` states when the aircraft counts as flying: above the airspeed `from_mps`. If a model is given, the limit in its
+//! envelope takes precedence. `shortest_s` (at least 0.5 s) is the shortest flight time with which a log is used.
 
 mod ardupilot;
 mod board;
@@ -71,45 +73,45 @@ pub enum MappingError {
 /// Source of a column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
-    /// The topic, message or record type.
+    /// Name of the topic.
     pub topic: String,
-    /// Name of the field.
+    /// Name of the field in the topic.
     pub field: String,
     /// Factor that converts the field to the column's unit.
     pub scale: f64,
     /// Constant that is added to the scaled field, in the column's unit.
     pub offset: f64,
-    /// The topic's instance; `None` leaves the choice to the reader.
+    /// The instance of the topic; `None` if the reader of the log chooses it.
     pub instance: Option<u16>,
-    /// Time span of the parabola whose slope is the column's value, s; `None` for the field itself.
+    /// If the column is the rate of change of the field: time span of the fitted parabola, s. Otherwise `None`.
     pub rate_over_s: Option<f64>,
 }
 
-/// A user's mapping, with the mixer of the aircraft.
+/// A user's mapping, with the mixer that assigns the autopilot's outputs to surfaces and motors.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mapping {
     /// Source of each mapped column.
     entries: BTreeMap<String, Entry>,
     /// Time span over which the attitude is differentiated to give body rates, s.
     body_rates_over_s: Option<f64>,
-    /// Known properties of sensors and wind.
+    /// Prior information on sensors and wind.
     sensors: Sensors,
     /// Source of the attitude, if the mapping names a quaternion.
     quaternion: Option<Turn>,
-    /// Orientation of the log's axes in the body.
+    /// Orientation of the log's axes relative to the body axes.
     board: Option<Board>,
-    /// Criteria for flight.
+    /// Criteria by which the aircraft counts as flying.
     flight: WrittenFlight,
     /// The mixer of the aircraft.
     mixer: Option<Mixer>,
 }
 
-/// Source of a quaternion, earth NED to body FRD.
+/// Source of the attitude as a quaternion, which rotates earth axes (NED) to body axes (FRD).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Turn {
-    /// The topic, message or record type.
+    /// Name of the topic.
     pub topic: String,
-    /// Fields of the four components, in the order of the file.
+    /// Names of the fields of the four components, in the order of the mapping file.
     pub fields: [String; 4],
     /// Order of the components. If it is `None`, the order in a CSV table is found from body rates and gravity; in
     /// other formats it is wxyz.
@@ -156,13 +158,13 @@ impl Mapping {
         Ok(Mapping { entries, body_rates_over_s, sensors, quaternion, board, flight, mixer: None })
     }
 
-    /// Orientation of the log's axes in the body, if the mapping has a section `[board]`.
+    /// Orientation of the log's axes relative to the body axes, if the mapping has a section `[board]`.
     pub(super) fn board(&self) -> Option<&Board> {
         self.board.as_ref()
     }
 
-    /// Criteria for flight: those of the `model` if it is known, else those of the mapping, else the default ones. A
-    /// `shortest_s` of the mapping applies in every case.
+    /// Criteria by which the aircraft counts as flying: those of the model (`model`) if there is one, else those of the mapping,
+    /// else the default ones. A `shortest_s` in the mapping applies in every case.
     pub fn flies(&self, model: Option<Flying>) -> Flying {
         let mut flies = model.unwrap_or_else(|| match self.flight.from_mps {
             Some(from) => Flying::from(from),
@@ -175,12 +177,12 @@ impl Mapping {
         flies
     }
 
-    /// Whether any column is computed by differentiating another over several rows.
+    /// Whether any column is computed as the rate of change of others.
     pub(super) fn derives(&self) -> bool {
         self.body_rates_over_s.is_some() || self.slopes().next().is_some()
     }
 
-    /// Known properties of sensors and wind.
+    /// Prior information on sensors and wind.
     pub fn sensors(&self) -> &Sensors {
         &self.sensors
     }
@@ -190,12 +192,12 @@ impl Mapping {
         self.body_rates_over_s
     }
 
-    /// The columns that are derivatives of others, each with the time span of its differentiation, s.
+    /// The columns that are rates of change of a field, each with the time span of the fitted parabola, s.
     pub(super) fn slopes(&self) -> impl Iterator<Item = (&str, f64)> {
         self.entries.iter().filter_map(|(column, e)| Some((column.as_str(), e.rate_over_s?)))
     }
 
-    /// Source of a column of a CSV table in words: a column of the file, or a derivation.
+    /// Text that names the source of a column of a CSV table: a column of the file, or what it is computed from.
     pub(super) fn origin(&self, column: &str) -> String {
         match self.get(column) {
             Some(e) if e.rate_over_s.is_some() => format!("rate of {}", e.field),
@@ -206,7 +208,7 @@ impl Mapping {
         }
     }
 
-    /// Whether a column that a log lacks is computed from others.
+    /// Whether `column` is computed from other columns if the log lacks it.
     pub(super) fn makes(&self, column: &str) -> bool {
         match column {
             derive::AIRSPEED => self.sensors.wind().is_some() && self.get(column).is_none(),
@@ -214,7 +216,7 @@ impl Mapping {
         }
     }
 
-    /// Sets the airframe's mixer, by which outputs of surfaces and motors in the log are converted to columns.
+    /// Sets the mixer of the airframe, by which logged outputs of the autopilot become columns of surfaces and motors.
     pub fn with_mixer(self, mixer: Option<Mixer>) -> Mapping {
         Mapping { mixer, ..self }
     }
@@ -229,7 +231,7 @@ impl Mapping {
         self.mixer.as_ref()
     }
 
-    /// The entry of a column.
+    /// The entry for `column`, if the mapping has one.
     pub fn get(&self, column: &str) -> Option<&Entry> {
         self.entries.get(column)
     }
@@ -242,13 +244,13 @@ impl Mapping {
             .map(|(column, e)| (column.as_str(), e))
     }
 
-    /// Whether the mapping itself reads a topic.
+    /// Whether the mapping file names the topic `topic`.
     pub(super) fn uses(&self, topic: &str) -> bool {
         let turn = self.quaternion.as_ref().is_some_and(|q| q.topic == topic);
         turn || self.entries.values().any(|e| e.topic == topic)
     }
 
-    /// The mapping's rules, then the rules of the format for the remaining columns.
+    /// The rules of the mapping file, then the built-in rules of the format for the remaining columns.
     pub(super) fn rules(&self, format: Format, topics: &Topics) -> Vec<Rule> {
         let own = self.entries.iter().map(|(column, e)| {
             Rule::linear(column, &e.topic, &e.field, e.scale).plus(e.offset).of(e.instance).own()
@@ -256,8 +258,7 @@ impl Mapping {
         let others = match format {
             Format::Csv => Vec::new(),
             Format::Ulog => px4::rules(topics),
-            // px4_msgs and MAVROS use different clocks for their time stamps, so the topics of only one of them are
-            // used.
+            // the time stamps of px4_msgs and MAVROS come from different clocks, so only one of the two is used
             Format::Ros if topics.first("vehicle_attitude").is_some() => px4::rules(topics),
             Format::Ros => mavros::rules(topics, self.mixer()),
             Format::Dataflash => ardupilot::rules(topics, self.mixer()),
@@ -277,7 +278,7 @@ impl Mapping {
         own.chain(turn.clone()).chain(free).collect()
     }
 
-    /// Whether any rule needs a field of a topic of a ULog or a ROS bag. An empty name stands for any field.
+    /// Whether any rule needs the field `field` of the topic `topic` of a ULog or a ROS bag. An empty name means any field.
     pub(super) fn wants_field(&self, format: Format, topic: &str, field: &str) -> bool {
         if field.is_empty() {
             return self.wants(format, topic);
@@ -292,7 +293,7 @@ impl Mapping {
         own || format == Format::Ros && ros() || entry() || turn()
     }
 
-    /// Whether any rule needs a topic of a format.
+    /// Whether any rule for `format` needs the topic `topic`.
     pub(super) fn wants(&self, format: Format, topic: &str) -> bool {
         let own: &[&str] = match format {
             Format::Csv => &[],

@@ -1,8 +1,8 @@
-//! Rules from PX4's topics to the columns of the table.
+//! Rules that compute the columns of Greylag's log table from the topics of a PX4 log.
 //!
-//! Pitch torque is positive nose up in PX4; elevator is positive nose down here. Of several motors only the first is
-//! used. Not mapped: `actuator_outputs`, whose pulses have a meaning only with parameters of the mixer, and `wind`,
-//! for which the log format has no column.
+//! Pitch torque is positive nose up in PX4, and the elevator column is positive nose down. Of several motors only the
+//! first is used. Two topics are not used: `actuator_outputs`, whose pulses can be interpreted only with parameters of the
+//! mixer, and `wind`, for which the table has no column.
 
 use super::rule::{Rule, Shape, Term, Tilt};
 use crate::Format;
@@ -33,7 +33,7 @@ pub const TOPICS: [&str; 20] = [
     "vehicle_attitude_setpoint",
 ];
 
-/// Fields that the rules use; a name that ends with a bracket matches all elements.
+/// Fields that the rules use. A name that ends with a bracket stands for all elements of an array.
 const FIELDS: [&str; 25] = [
     "q[",
     "q_d[",
@@ -67,7 +67,7 @@ pub fn uses(field: &str) -> bool {
     FIELDS.iter().any(|f| if f.ends_with('[') { field.starts_with(f) } else { field == *f })
 }
 
-/// The rules, preferred ones first.
+/// The rules. If several rules give the same column, the preferred one comes first.
 pub fn rules(topics: &Topics) -> Vec<Rule> {
     let mut out = vec![Rule::quaternion("vehicle_attitude", ["q[0]", "q[1]", "q[2]", "q[3]"])];
     for (i, (rate, force)) in
@@ -114,7 +114,8 @@ pub fn rules(topics: &Topics) -> Vec<Rule> {
 fn commands(topics: &Topics) -> Vec<Rule> {
     let mut out = allocated(topics);
     out.extend(motor(topics));
-    // The three torques, then the thrust. In a VTOL, instance 1 is the controller of wing-borne flight.
+    // The torque setpoints about the three axes and the thrust setpoint serve as commands. In a VTOL, instance 1 of
+    // their topics is that of wing-borne flight.
     let kind = vehicle::vehicle(Format::Ulog, topics).map(|v| v.kind);
     let vtol = kind == Some(Kind::Vtol);
     let fixed_wing = if vtol { Some(1) } else { None };
@@ -150,7 +151,7 @@ fn commands(topics: &Topics) -> Vec<Rule> {
     out
 }
 
-/// Throttle command from the first motor; `None` if it does not run at any time of the log.
+/// Throttle command from the first motor; `None` if the log has no finite command for it.
 fn motor(topics: &Topics) -> Option<Rule> {
     let (topic, field) = ("actuator_motors", "control[0]");
     let runs = topics.first(topic)?.field(field)?.iter().any(|x| x.is_finite());
@@ -158,7 +159,8 @@ fn motor(topics: &Topics) -> Option<Rule> {
     runs.then(|| Rule::sum("throttle_cmd", topic, vec![term]))
 }
 
-/// Commands from the servo outputs, weighted by the torques of the surfaces (parameters CA_SV_CSn_TRQ_*).
+/// Commands of aileron, elevator and rudder as means of the servo outputs. The weights are the torques of the surfaces about
+/// the axis (parameters CA_SV_CSn_TRQ_*).
 fn allocated(topics: &Topics) -> Vec<Rule> {
     let mut out = Vec::new();
     for (column, axis, sign) in

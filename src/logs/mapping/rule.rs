@@ -1,4 +1,5 @@
-//! Rules that fill columns of the table from the fields of a topic.
+//! Rules that fill columns of the table of a flight from the fields of a topic. A topic is one type of message in a log. An
+//! instance is one of several sources of the same topic, for example the second airspeed sensor.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -18,7 +19,7 @@ pub enum Shape {
         /// Pulse at 1, µs.
         max: f64,
     },
-    /// The command of a motor of PX4. NaN, which stops the motor, becomes 0.
+    /// The value is a motor command of PX4. NaN, which stops the motor, becomes 0.
     Motor,
     /// Converts a pulse to 0..1.
     Range {
@@ -40,7 +41,7 @@ impl Shape {
                     x
                 }
             }
-            // a pulse of zero means that there is none: the safety switch is on, or the output is not set
+            // zero means that no pulse is sent: the safety switch is on, or the output is not set
             Shape::Surface { .. } if x <= 0.0 => f64::NAN,
             Shape::Surface { min, trim, max } => {
                 let side = if x > trim { max - trim } else { trim - min };
@@ -54,8 +55,8 @@ impl Shape {
 
 /// One term of the sum that fills a column: the converted field times a gain.
 ///
-/// A pulse of zero means that there is none, as in a disarmed vehicle. A motor then stands still, and the deflection
-/// of a servo is unknown (NaN).
+/// A pulse of zero means that no pulse is sent, as in a disarmed vehicle. A motor then stands still, and the deflection of
+/// a servo is unknown (NaN).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Term {
     /// Name of the field.
@@ -70,8 +71,7 @@ impl Term {
     /// The value of the term for the field's value `x`.
     fn of(&self, x: f64) -> f64 {
         match self.shape {
-            // a negative gain means reversed pulses or a difference of motors; the value without a pulse is then
-            // unknown
+            // a negative gain means reversed pulses or a difference of motors; without a pulse the value is then unknown
             Shape::Range { .. } if x <= 0.0 => {
                 if self.gain > 0.0 {
                     0.0
@@ -99,7 +99,7 @@ impl Axes {
         match self {
             Axes::NedFrd => [w, x, y, z],
             // Multiplication by (0, 1, 1, 0)/√2 from the left turns ENU into NED. Multiplication by (0, 1, 0, 0) from
-            // the right turns FRD into FLU. The sign of the product is changed, which leaves the rotation as it is.
+            // the right turns FRD into FLU. The product is negated, which does not change the rotation.
             Axes::EnuFlu => [w + z, x + y, x - y, w - z].map(|c| c * FRAC_1_SQRT_2),
         }
     }
@@ -129,7 +129,7 @@ impl Tilt {
     }
 }
 
-/// Columns of a rule, and how they are filled.
+/// The columns that a rule fills, and the computation of their values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fill {
     /// One column: the sum of terms plus an offset.
@@ -159,11 +159,11 @@ pub enum Fill {
         /// Axes between which the quaternion rotates.
         axes: Axes,
     },
-    /// Air density from static pressure and temperature. The field times its factor is in Pa and in °C.
+    /// Air density from static pressure and temperature.
     Density {
-        /// The pressure's field with its factor.
+        /// Field of the pressure, and the factor that converts it to Pa.
         pressure: (&'static str, f64),
-        /// The temperature's field with its factor.
+        /// Field of the temperature, and the factor that converts it to °C.
         temperature: (&'static str, f64),
     },
 }
@@ -173,13 +173,14 @@ pub enum Fill {
 pub struct Rule {
     /// Name of the topic.
     pub topic: String,
-    /// Instance of the topic; `None` accepts any.
+    /// Instance of the topic; `None` accepts any instance.
     pub instance: Option<u16>,
-    /// The instance to prefer for the vehicle's type if its fields change; `None` for no preference.
+    /// The instance that is preferred for this type of vehicle. It is used if the values of its fields change during the log.
+    /// `None` for no preference.
     pub preferred: Option<u16>,
-    /// Columns that the rule fills, and how.
+    /// The columns that the rule fills, and the computation of their values.
     pub fill: Fill,
-    /// Note to the user if this rule is used.
+    /// Note that the user gets if this rule is used; `None` without a note.
     pub note: Option<String>,
     /// Whether the airspeed is equivalent airspeed, to be converted to true airspeed with the density.
     pub equivalent: bool,
@@ -234,8 +235,8 @@ impl Rule {
         self
     }
 
-    /// A rule for the air density by the gas law. Pressure and temperature are each a field with its factor to Pa or
-    /// °C.
+    /// A rule for the air density by the gas law. Each of `pressure` and `temperature` is a field and the factor that converts
+    /// it to Pa or °C.
     pub fn density(
         topic: &str,
         pressure: (&'static str, f64),
@@ -252,17 +253,17 @@ impl Rule {
         self
     }
 
-    /// The rule for one instance of the topic only.
+    /// The same rule for one instance of the topic only, or for any instance if `instance` is `None`.
     pub fn of(self, instance: Option<u16>) -> Rule {
         Rule { instance, ..self }
     }
 
-    /// The same rule with an instance that is preferred if its fields change.
+    /// The same rule with the preferred instance `preferred`.
     pub fn preferring(self, preferred: Option<u16>) -> Rule {
         Rule { preferred, ..self }
     }
 
-    /// The rule with a note to the user.
+    /// The same rule with a note to the user.
     pub fn noting(self, note: impl Into<String>) -> Rule {
         Rule { note: Some(note.into()), ..self }
     }
@@ -287,7 +288,7 @@ impl Rule {
         }
     }
 
-    /// The rule; `None` if one of its columns is `taken` by another rule.
+    /// Returns the rule, or `None` if another rule already fills one of its columns. `taken` states this for a column.
     pub fn without(self, taken: impl Fn(&str) -> bool) -> Option<Rule> {
         let free = !self.columns().iter().any(|c| taken(c));
         free.then_some(self)
@@ -308,7 +309,7 @@ impl Rule {
         format!("{}.{}", self.topic, self.fields().join("+"))
     }
 
-    /// Field and factor of the rule, if it only scales one field; else `None`.
+    /// Field and factor of a rule that only scales one field; `None` for other rules.
     pub fn factor(&self) -> Option<(&str, f64)> {
         match &self.fill {
             Fill::Sum { terms, offset: 0.0, .. } => match &terms[..] {

@@ -1,4 +1,4 @@
-//! Converts ArduPilot's servo outputs back to commands by the SERVOn parameters.
+//! Rules that convert ArduPilot's servo pulses back to commands with the parameters SERVOn_*.
 
 use super::rule::{Rule, Shape, Term};
 use crate::topics::Topics;
@@ -14,15 +14,13 @@ const THROTTLE: f64 = 70.0;
 const ELEVON_LEFT: f64 = 77.0;
 const ELEVON_RIGHT: f64 = 78.0;
 
-/// Rules that compute the commands from the servo pulses of `topic`. The field of channel n, from 1, is named
-/// `field(n)`.
+/// Rules that compute the commands from the servo pulses of `topic`. `field(n)` is the name of the field of channel n, from 1.
 ///
-/// Positive elevator is nose up in ArduPilot, nose down in the log format. Elevons: left =
-/// g (elevator − aileron), right = g (elevator + aileron), g = MIXING_GAIN (0.5).
+/// Positive elevator is nose up in ArduPilot, nose down in the log format. Elevons: left = g (elevator − aileron), right = g
+/// (elevator + aileron), with g = MIXING_GAIN (0.5 by default).
 ///
-/// If the airframe's `mixer` assigns the channels, its pseudoinverse gives the commands from the pulses. A command of
-/// one is then the longest pulse, because the airframe describes the servos and not the functions that the flight
-/// controller assigns to them.
+/// If the airframe's `mixer` assigns the channels, its pseudoinverse gives the commands from the pulses. SERVOn_REVERSED is
+/// then not applied, because the gains of the mixer refer to the servos themselves.
 pub fn rules(
     topics: &Topics,
     topic: &str,
@@ -75,8 +73,8 @@ pub fn rules(
     out
 }
 
-/// Rules that compute the commands from the pulses by the `mixer`; `None` if it does not name the channels of all
-/// effectors.
+/// Rules that compute the commands from the pulses by the pseudoinverse of `mixer`. `None` if `mixer` lacks the channel of an
+/// effector (surface or motor) that is needed.
 fn mixed(
     topics: &Topics,
     topic: &str,

@@ -1,8 +1,8 @@
-//! Rules from the messages of a telemetry log to the columns of the table.
+//! Rules by which the messages of a telemetry log fill the columns of the table.
 //!
-//! States come from the system and component that sends most attitude messages. Commands come from any component of
-//! that system. The airspeed of VFR_HUD is true airspeed if a simulator sends it (profile `sitl`), and equivalent
-//! airspeed if ArduPilot or PX4 does.
+//! States are read from the MAVLink system and component that sends most attitude messages, commands from any component of this
+//! system. The airspeed of VFR_HUD is true airspeed if the simulator sends it (profile `sitl`, the link to the simulator), and
+//! equivalent airspeed if ArduPilot or PX4 sends it.
 
 use super::rule::Rule;
 use super::servos;
@@ -38,7 +38,7 @@ const MILLI_G: f64 = STANDARD_GRAVITY / 1000.0;
 #[expect(clippy::approx_constant, reason = "the simulator's stop is at 0.5235 rad, not at 30°")]
 const DEFLECTION: f64 = 0.5235;
 
-/// The rules, preferred ones first.
+/// The rules. If several rules fill the same column, the first one is preferred.
 pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
     let Some(vehicle) = vehicle(topics) else { return Vec::new() };
     let system = vehicle.to_be_bytes()[0];
@@ -46,7 +46,7 @@ pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
     out.extend(deflections(topics, system));
     out.push(airspeed(topics, system));
     for rule in &mut out {
-        // If this component does not send a message, another component of the same system may.
+        // if this component does not send a message, another component of the same system is used
         let has = |i: u16| topics.topics.contains_key(&(rule.topic.clone(), i));
         let other =
             topics.instances(&rule.topic).map(|(i, _)| i).find(|i| i.to_be_bytes()[0] == system);
@@ -79,14 +79,15 @@ pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
     out
 }
 
-/// The instance with most attitude messages, within the system whose flight is read.
+/// The instance (system and component) with most attitude messages. If the topics are those of one system's flight, only its
+/// instances count.
 fn vehicle(topics: &Topics) -> Option<u16> {
     let both = topics.instances("ATTITUDE_QUATERNION").chain(topics.instances("ATTITUDE"));
     let own = both.filter(|(i, _)| topics.system.is_none_or(|s| i.to_be_bytes()[0] == s));
     own.max_by_key(|(_, t)| t.time_s.len()).map(|(i, _)| i)
 }
 
-/// The MAV_AUTOPILOT numbers that a system sends.
+/// The MAV_AUTOPILOT numbers in the heartbeats of a system.
 fn autopilots(topics: &Topics, system: u8) -> impl Iterator<Item = f64> {
     let of_system = move |(i, topic): (u16, &Topic)| {
         (i.to_be_bytes()[0] == system).then(|| topic.field("autopilot")?.last().copied())?
@@ -105,8 +106,8 @@ fn airspeed(topics: &Topics, system: u8) -> Rule {
     }
 }
 
-/// The rules for a table whose columns are named by message and field, such as `ATTITUDE.roll`. The sender is not
-/// known, so VFR_HUD is taken as that of a real autopilot, with equivalent airspeed.
+/// The rules for a table whose columns are named by message and field, such as `ATTITUDE.roll`. The sender is not known. VFR_HUD
+/// is therefore assumed to come from a real autopilot, with equivalent airspeed.
 pub fn of_table() -> Vec<Rule> {
     let mut out = states();
     out.push(Rule::linear("airspeed_mps", "VFR_HUD", "airspeed", 1.0).equivalent());
@@ -153,8 +154,8 @@ fn states() -> Vec<Rule> {
     out
 }
 
-/// Rules for the actuator positions in the order of the sitl profile. Its simulator sends the travel of the surfaces
-/// if it differs from the X8's.
+/// Rules for the actuator positions, whose order is that of the sitl profile. The simulator sends the travels of the surfaces if
+/// they differ from those of the X8.
 fn deflections(topics: &Topics, system: u8) -> Vec<Rule> {
     let [aileron, elevator, rudder] =
         sent_travel(topics, system).unwrap_or([DEFLECTION, DEFLECTION, 0.0]);
@@ -172,8 +173,8 @@ fn deflections(topics: &Topics, system: u8) -> Vec<Rule> {
         .collect()
 }
 
-/// Travel of aileron, elevator and rudder as the vehicle sends it, rad; the rudder's is zero if there is none. `None`
-/// if the vehicle sends no travel.
+/// Travels of aileron, elevator and rudder that the vehicle sends, rad. The rudder's is the larger of its two travels, or zero
+/// without a rudder. `None` if the vehicle sends no travels.
 fn sent_travel(topics: &Topics, system: u8) -> Option<[f64; 3]> {
     let (_, topic) = topics
         .instances("ACTUATOR_OUTPUT_STATUS")

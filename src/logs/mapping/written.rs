@@ -1,4 +1,5 @@
-//! The mapping file as it is deserialised from TOML, and the checks of its parts.
+//! The mapping file as it is deserialised from TOML, and the checks of its parts. A mapping file tells which fields of a log
+//! fill the columns of Greylag's log format.
 
 use std::collections::BTreeMap;
 
@@ -76,7 +77,7 @@ fn one() -> f64 {
     1.0
 }
 
-/// Smallest `flight.shortest_s` that a mapping may set, s.
+/// Smallest value that a mapping file may set for `flight.shortest_s`, s.
 const SHORTEST_S: f64 = 0.5;
 
 pub(super) fn thresholds(flight: WrittenFlight) -> Result<WrittenFlight, String> {
@@ -135,7 +136,8 @@ pub(super) fn entry(column: &str, e: WrittenEntry) -> Result<Entry, String> {
     })
 }
 
-/// Refuses a time span (s) that is too short or too long for the fit of a slope.
+/// Refuses a time span over which a rate of change is to be fitted, unless it is above 0 and at most 10 s. `what` names the
+/// setting in the error text.
 pub(super) fn over(what: &str, time: Option<f64>) -> Result<(), String> {
     match time {
         Some(x) if !(x > 0.0 && x <= 10.0) => {
@@ -145,7 +147,7 @@ pub(super) fn over(what: &str, time: Option<f64>) -> Result<(), String> {
     }
 }
 
-/// The instance number of `system/component`; `None` if the text has another form.
+/// The number that stands for the sender `system/component` of a MAVLink message; `None` if `text` has another form.
 fn source(text: &str) -> Option<u16> {
     let (system, component) = text.split_once('/')?;
     Some(u16::from_be_bytes([system.trim().parse().ok()?, component.trim().parse().ok()?]))

@@ -1,5 +1,5 @@
-//! Reads the chunks of an MCAP file. They are unpacked while they are read, and their checksum is compared at the
-//! end.
+//! Reads the chunks of an MCAP file (a ROS 2 bag). A chunk is a record that contains compressed messages. It is unpacked while
+//! it is read, and its checksum is compared at its end.
 
 use std::io::{self, Read};
 
@@ -10,21 +10,21 @@ use super::records::bytes;
 use super::{LOOK, Reader};
 use crate::window::Window;
 
-/// Number of bytes (times, size, checksum) before the name of the compression.
+/// Number of bytes in a chunk's header (times, size, checksum) before the name of the compression.
 const TO_NAME: usize = 28;
 /// Length of the longest name of a compression, bytes.
 const NAME: usize = 16;
 /// The largest accepted window of a zstd frame, bytes. Compressors need a larger one only from level 20 on.
 const ZSTD_WINDOW: u64 = 8 << 20;
 
-/// The unread rest of a record's body.
+/// The unread rest of a record's body, of which `left` bytes remain.
 pub(super) struct Body<'b, 'w> {
     pub window: &'b mut Window<'w>,
     pub left: u64,
 }
 
 impl Body<'_, '_> {
-    /// Skips the rest. Returns the number of its bytes that the file lacks.
+    /// Skips the rest of the body. Returns the number of bytes by which the file ends too early.
     pub fn finish(mut self) -> u64 {
         let _ = io::copy(&mut self, &mut io::sink());
         self.left
@@ -46,7 +46,8 @@ impl Read for Body<'_, '_> {
     }
 }
 
-/// Whether the header of a chunk agrees with the length of its record. `body` may hold only a part of the header.
+/// Whether the sizes in a chunk's header agree with the length of its record, `length`. `body` is the start of the record's
+/// body. If it ends within the header, only the part that it has is checked.
 pub(super) fn agrees(body: &[u8], length: u64) -> bool {
     let Some(name) = bytes(body, TO_NAME).map(|b| u32::from_le_bytes(b) as usize) else {
         return length > (TO_NAME + 12) as u64;
@@ -56,7 +57,7 @@ pub(super) fn agrees(body: &[u8], length: u64) -> bool {
     name <= NAME && size.is_none_or(|size| size.checked_add(head) == Some(length))
 }
 
-/// A source that computes the checksum of the bytes that are read.
+/// A reader that computes the checksum of the bytes that were read from `source`.
 struct Summed<R> {
     source: R,
     sum: crc32fast::Hasher,
@@ -71,7 +72,7 @@ impl<R: Read> Read for Summed<R> {
 }
 
 impl Reader<'_> {
-    /// Reads the messages of a chunk.
+    /// Reads the messages of a chunk. An invalid chunk is counted, and the rest of it is skipped.
     pub(super) fn chunk(&mut self, body: &mut Body<'_, '_>) {
         self.chunks += 1;
         if let Err(error) = self.unpacked(body) {

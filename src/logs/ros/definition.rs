@@ -1,26 +1,26 @@
-//! Finds the fields of a ROS 2 message by its definition, and reads their values from a message in CDR.
+//! Finds the fields of a ROS 2 message type in its text definition, and reads their values from a message in the CDR encoding.
 //!
-//! The crate `re_ros_msg` (0.36.3) is not used. It refuses a whole definition for one constant whose name is not in
-//! capitals, and it makes a map of all fields for each message. Here only the requested fields are read. The rest of
-//! a message after the last of them is not read.
+//! The crate `re_ros_msg` (0.36.3) is not used. It rejects a whole definition if the name of one constant is not in
+//! capitals, and it builds a map of all fields for each message. This reader stores only the requested fields and stops
+//! after the last of them.
 //!
-//! Not read: strings, elements of sequences of messages, and every message type that contains a `wstring`.
+//! Strings and the elements of arrays of messages are skipped. A message type with a `wstring` cannot be read.
 
 use std::collections::BTreeMap;
 
 use super::cdr::Cdr;
 use crate::number::Number;
 
-/// Largest nesting of message types that is followed; those of MAVROS and PX4 have five levels at most.
+/// Largest nesting of message types that is read. Types of MAVROS and PX4 have at most five levels.
 const DEPTH: usize = 8;
-/// Largest number of reading steps and array elements for all message types of a bag. `nav_msgs/Odometry` has about a
+/// Largest number of fields and array elements, summed over all message types of a bag. `nav_msgs/Odometry` has about a
 /// hundred.
 pub(super) const STEPS: usize = 1 << 16;
 /// Largest number of fields of a message that are read.
 const FIELDS: usize = 256;
 /// Largest number of elements of an array that are read as fields.
 const ELEMENTS: usize = 32;
-/// Fields that give the time of a message. Their values come first in a decoded message.
+/// Fields that state the time of a message. Their values come first in a decoded message.
 pub(super) const STAMPS: [&str; 4] =
     ["header.stamp.sec", "header.stamp.nanosec", "timestamp", "timestamp_sample"];
 
@@ -39,14 +39,14 @@ enum Step {
     Number(Number, Option<usize>),
     /// A string, which is skipped.
     Text,
-    /// An array of numbers, with the indices of the values of its first elements.
+    /// An array of numbers. For each of its first elements: the index of its value, if it is requested.
     Numbers(Number, Count, Vec<Option<usize>>),
     /// An array of strings or messages, which is skipped.
     Each(Count, Vec<Step>),
 }
 
 impl Step {
-    /// Whether the step reads a value.
+    /// Whether the step stores a value.
     fn reads(&self) -> bool {
         match self {
             Step::Number(_, place) => place.is_some(),
@@ -56,21 +56,20 @@ impl Step {
     }
 }
 
-/// The fields of a type: type and name of each.
+/// The fields of a message type, each as type and name.
 type Fields<'t> = Vec<(&'t str, &'t str)>;
 
 /// The steps by which the requested fields of a message type are read.
 #[derive(Debug)]
 pub(super) struct Plan {
     steps: Vec<Step>,
-    /// Names of the fields, nested ones as `outer.inner`, elements as `field[0]`.
+    /// Names of the requested fields in the order of their values, such as `outer.inner` or, for an array element, `field[0]`.
     pub fields: Vec<String>,
 }
 
 impl Plan {
-    /// Makes the plan for the type `name` (`package/msg/Type`) from the definitions in `text`. It reads the fields
-    /// for which `wanted` is true. `None` if a definition is missing, or if the plan needs more steps than are left
-    /// in `budget`.
+    /// Makes the plan for the type `name` (`package/msg/Type`) from the definitions in `text`, for the fields that `wanted`
+    /// selects. `None` if a definition is missing, or nested too deeply, or needs more steps than are left in `budget`.
     pub fn of(
         name: &str,
         text: &str,
@@ -86,8 +85,8 @@ impl Plan {
         Some(Plan { steps, fields: maker.fields })
     }
 
-    /// Reads a message into `values`: [`STAMPS`], then the fields; NaN if a value is absent. Returns `false` if the
-    /// message does not fit the definition.
+    /// Reads a message into `values`: first the fields of [`STAMPS`], then `fields`. An absent value is NaN. Returns `false` if
+    /// the message does not fit the definition.
     pub fn decode(&self, message: &[u8], values: &mut Vec<f64>) -> bool {
         values.clear();
         values.resize(STAMPS.len() + self.fields.len(), f64::NAN);
@@ -120,7 +119,7 @@ fn run(steps: &[Step], cdr: &mut Cdr<'_>, values: &mut [f64]) -> Option<()> {
                 for _ in 0..counted(*count, cdr)? {
                     let before = cdr.left();
                     run(steps, cdr, values)?;
-                    // Elements without any bytes need not be read one by one, however many the message states.
+                    // If an element has no bytes, the message may state any number of them: they are not read one by one.
                     if cdr.left() == before {
                         break;
                     }
@@ -138,26 +137,26 @@ fn counted(count: Count, cdr: &mut Cdr<'_>) -> Option<usize> {
     }
 }
 
-/// Makes the steps of a message.
+/// Makes the steps of a plan.
 struct Maker<'m> {
     types: &'m BTreeMap<String, Fields<'m>>,
     wanted: &'m dyn Fn(&str) -> bool,
     fields: Vec<String>,
-    /// Steps that may still be made.
+    /// Number of steps that may still be made.
     budget: &'m mut usize,
 }
 
 impl Maker<'_> {
-    /// Takes `steps` off the budget; `None` if it is too small.
+    /// Subtracts `steps` from the budget; `None` if it is too small.
     fn spend(&mut self, steps: usize) -> Option<()> {
         *self.budget = self.budget.checked_sub(steps)?;
         Some(())
     }
 
-    /// Index of the value of a field; `None` if the field is not requested.
+    /// Index at which the value of the field `name` is stored; `None` if the field is not requested.
     fn place(&mut self, name: &str) -> Option<usize> {
         if let Some(stamp) = STAMPS.iter().position(|stamp| *stamp == name) {
-            // A stamp is read in any case and has a fixed index.
+            // A field with the time is always stored, at a fixed index.
             return Some(stamp);
         }
         let fits = self.fields.len() < FIELDS && (self.wanted)(name);
@@ -167,8 +166,8 @@ impl Maker<'_> {
         })
     }
 
-    /// Appends the steps for a message of type `name` to `out`. `prefix` precedes the names of its fields. Without a
-    /// prefix the fields are skipped.
+    /// Appends the steps for a message of type `name` to `out`. `prefix` precedes the names of its fields. If it is `None`,
+    /// the fields are read past and not stored.
     fn message(
         &mut self,
         name: &str,
@@ -197,7 +196,8 @@ impl Maker<'_> {
         Some(())
     }
 
-    /// Appends the step for a field to `out`. `kind` is its type as it is written in a message of `package`.
+    /// Appends the steps for a field to `out`. `kind` is its type as written in a definition of `package`. `path` is its name
+    /// with prefix; if it is `None`, the field is not stored.
     fn field(
         &mut self,
         kind: &str,
@@ -238,10 +238,10 @@ impl Maker<'_> {
     }
 }
 
-/// The fields of `builtin_interfaces/Time` and `Duration`, which some writers leave out.
+/// The fields of `builtin_interfaces/Time` and `Duration`. Some bags lack the definitions of these two types.
 const TIME: [(&str, &str); 2] = [("int32", "sec"), ("uint32", "nanosec")];
 
-/// Element type and number of elements of an array type. Another type is returned as it is, without a number.
+/// Element type and number of elements of an array type. A type that is no array is returned as it is, without a number.
 fn array(kind: &str) -> Option<(&str, Option<Count>)> {
     let Some((element, count)) = kind.split_once('[') else { return Some((kind, None)) };
     let count = count.strip_suffix(']')?;
@@ -250,12 +250,12 @@ fn array(kind: &str) -> Option<(&str, Option<Count>)> {
     Some((element, Some(count)))
 }
 
-/// Whether a type is a string, with or without a bound.
+/// Whether a type is a string, with or without a bound on its length.
 fn is_text(kind: &str) -> bool {
     kind.split("<=").next() == Some("string")
 }
 
-/// The full name `package/Type` of a type, as it is written in a message of `package`.
+/// The full name `package/Type` of a type that a definition of `package` names `kind`.
 fn full(kind: &str, package: &str) -> String {
     match kind {
         "Header" => "std_msgs/Header".to_owned(),
@@ -272,7 +272,8 @@ fn short(name: &str) -> String {
     }
 }
 
-/// The types in a definition: `name`, then those after lines of `=` and `MSG: package/Type`.
+/// The message types in the definition `text`, with their fields. The first is `name`. Each further one begins with a line
+/// `MSG: package/Type`.
 fn types<'t>(name: &str, text: &'t str) -> BTreeMap<String, Fields<'t>> {
     let mut types: BTreeMap<String, Fields<'t>> = BTreeMap::new();
     let mut current = short(name);
@@ -362,7 +363,7 @@ mod tests {
             );
             assert!(of("pulses[2]").is_nan());
         }
-        // A message that is cut anywhere does not fit its definition.
+        // A message that ends too early does not fit its definition.
         let whole = message(true);
         assert!((0..whole.len()).all(|end| !plan.decode(&whole[..end], &mut values)));
     }
@@ -384,7 +385,7 @@ mod tests {
             )
             .is_none()
         );
-        // Four thousand million empty elements take no time.
+        // The message states 2³² − 1 elements without bytes.
         let plan = Plan::of(
             "own/msg/A",
             "E[] e\nint8 x\n===\nMSG: own/E\nint8[0] n\n",

@@ -1,9 +1,9 @@
-//! Records of an MCAP file that declare topics, and the codes of the records.
+//! Decodes the records of an MCAP file (a bag of ROS 2) that declare topics, and lists the codes of the records.
 //!
 //! The crate `mcap` (0.26.0) is not used. Its readers hold the largest record in memory, such as a camera image, and
 //! stop at the first damage.
 
-/// Codes of the records, by <https://mcap.dev/spec>.
+/// Codes that identify the kind of a record, from <https://mcap.dev/spec>.
 pub(super) mod op {
     pub const FOOTER: u8 = 0x02;
     pub const SCHEMA: u8 = 0x03;
@@ -21,7 +21,7 @@ pub(super) struct Schema {
     pub id: u16,
     /// Name of the type, `package/msg/Type`.
     pub name: String,
-    /// Language of the definition.
+    /// Language in which `text` defines the type.
     pub encoding: String,
     pub text: String,
 }
@@ -40,14 +40,14 @@ pub(super) fn bytes<const N: usize>(view: &[u8], at: usize) -> Option<[u8; N]> {
     view.get(at..)?.first_chunk().copied()
 }
 
-/// Takes a number off the beginning of `body`.
+/// Reads a number from the beginning of `body` and removes it.
 fn number(body: &mut &[u8]) -> Option<u16> {
     let (number, rest) = body.split_first_chunk()?;
     *body = rest;
     Some(u16::from_le_bytes(*number))
 }
 
-/// Takes a text, which follows its length, off the beginning of `body`.
+/// Reads a length and a text of this length from the beginning of `body` and removes both.
 fn text(body: &mut &[u8]) -> Option<String> {
     let (length, rest) = body.split_first_chunk()?;
     let (text, rest) = rest.split_at_checked(u32::from_le_bytes(*length) as usize)?;
@@ -55,14 +55,14 @@ fn text(body: &mut &[u8]) -> Option<String> {
     Some(String::from_utf8_lossy(text).into_owned())
 }
 
-/// The definition of a message type in the body of a record.
+/// Decodes the definition of a message type from the body of a record.
 pub(super) fn schema(mut body: &[u8]) -> Option<Schema> {
     let body = &mut body;
     let (id, name) = (number(body)?, text(body)?);
     Some(Schema { id, name, encoding: text(body)?, text: text(body)? })
 }
 
-/// The declaration of a channel in the body of a record.
+/// Decodes the declaration of a channel from the body of a record.
 pub(super) fn channel(mut body: &[u8]) -> Option<Channel> {
     let body = &mut body;
     let (id, schema) = (number(body)?, number(body)?);

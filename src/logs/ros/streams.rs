@@ -1,4 +1,6 @@
-//! The topics of a bag: how their messages are read, and to which vehicle each topic belongs.
+//! The topics of a ROS 2 bag: how their messages are read, and to which vehicle each topic belongs.
+//!
+//! A stamp is the time that a message carries. The recorder's time is the time at which the bag received the message.
 
 use std::collections::BTreeMap;
 
@@ -9,12 +11,11 @@ use crate::finding::Finding;
 use crate::stretches::Keep;
 use crate::topics::{Topic, Topics};
 
-/// Stamps later than this, s, count from 1970. Earlier ones count from the boot of the vehicle or the start of a
-/// simulation.
+/// Stamps above this value, s, count from 1970. Lower ones count from the boot of the vehicle or the start of a simulation.
 const SINCE_1970_S: f64 = 1e8;
-/// Number of attitude messages from which a further namespace counts as another vehicle.
+/// Number of attitude messages from which a namespace counts as a vehicle.
 const VEHICLE: usize = 10;
-/// Topics with an attitude, by which vehicles are counted.
+/// Topics with an attitude, by which the vehicles are counted.
 const ATTITUDES: [&str; 2] = ["vehicle_attitude", "imu/data"];
 
 /// Package of the messages of PX4.
@@ -22,26 +23,26 @@ const PX4: &str = "px4_msgs/";
 
 /// A topic of the bag.
 struct Stream {
-    /// Namespace of the vehicle; empty for the only one.
+    /// Namespace of the vehicle; empty if the topic has none.
     vehicle: String,
     /// Name of the topic in rules and mappings.
     name: String,
-    /// Whether its messages are of `px4_msgs`, whose `timestamp` is in microseconds.
+    /// Whether its messages are of the package `px4_msgs`, whose `timestamp` is in microseconds.
     px4: bool,
     count: usize,
-    /// How its messages are read; `None` if the topic is not requested.
+    /// The steps by which its messages are read; `None` if the topic is not requested or cannot be read.
     plan: Option<Plan>,
     topic: Option<Topic>,
     /// Number of messages that do not fit the definition or are too long.
     unfit: usize,
-    /// Why its requested messages cannot be read; `None` if they can.
+    /// Reason why its requested messages cannot be read; `None` if they can.
     unread: Option<String>,
 }
 
-/// Relation of the clock of the stamps to the clock of the recorder.
+/// Relation of the stamps to the recorder's time.
 #[derive(Default)]
 struct Clock {
-    /// The second from which its times are counted; zero for a clock that begins at a boot.
+    /// Whole seconds that are subtracted from the stamps. Zero for a clock that starts at a boot.
     epoch_s: Option<f64>,
     /// Recorder's time minus the message's time, s.
     offset_s: Option<f64>,
@@ -51,7 +52,8 @@ struct Clock {
 }
 
 impl Clock {
-    /// The time of a message, s, from its stamp and the recorder's time (s). Jumps of the stamps are removed.
+    /// The time of a message, s, from its stamp and the recorder's time (s). If the stamps jump relative to the recorder's
+    /// time, the jump is removed.
     fn time(&mut self, stamp_s: f64, log_s: f64) -> f64 {
         let time = stamp_s + self.shift_s;
         let offset = log_s - time;
@@ -74,21 +76,21 @@ pub(super) struct Streams<'w> {
     wanted: &'w dyn Fn(&str, &str) -> bool,
     keep: Keep,
     schemas: BTreeMap<u16, Schema>,
-    /// The stream of each channel.
+    /// Index of the stream of each channel.
     channels: BTreeMap<u16, usize>,
-    /// The stream of each topic, by its full name.
+    /// Index of the stream of each topic, by the topic's full name.
     by_topic: BTreeMap<String, usize>,
     streams: Vec<Stream>,
-    /// The clocks of `header.stamp` and of `timestamp`.
+    /// The clocks of the stamps `header.stamp` and `timestamp`.
     clocks: [Clock; 2],
     /// Whole second of the first message on the recorder's clock. The recorder's times count from it.
     log_epoch_s: Option<u64>,
     values: Vec<f64>,
-    /// Number of reading steps that plans may still have. The limit keeps a damaged file from using much memory.
+    /// Number of steps that further plans may have. The limit keeps a damaged file from using much memory.
     budget: usize,
-    /// Messages on channels that the file does not declare.
+    /// Number of messages on channels that the file does not declare.
     orphans: usize,
-    /// Definitions and declarations that cannot be read.
+    /// Number of definitions and declarations that cannot be read.
     unreadable: usize,
 }
 
@@ -119,7 +121,7 @@ impl<'w> Streams<'w> {
         }
     }
 
-    /// Takes the declaration of a channel. A second channel of a topic joins the stream of the first.
+    /// Takes the declaration of a channel. A second channel of the same topic fills the stream of the first.
     pub fn declare(&mut self, channel: Option<Channel>) {
         let Some(channel) = channel else {
             self.unreadable += 1;
@@ -153,7 +155,7 @@ impl<'w> Streams<'w> {
         self.channels.contains_key(&channel)
     }
 
-    /// Counts a message. Returns whether it is to be read. A message that is too long (not `short`) is only counted.
+    /// Counts a message and returns whether it must be read. A message that is too long (not `short`) is only counted.
     pub fn counts(&mut self, channel: u16, short: bool) -> bool {
         let stream = self.channels.get(&channel).and_then(|i| self.streams.get_mut(*i));
         let Some(stream) = stream else {
@@ -165,7 +167,7 @@ impl<'w> Streams<'w> {
         stream.plan.is_some() && short
     }
 
-    /// Takes the content of a message that the recorder received at `log_ns` (ns since 1970).
+    /// Reads a message that the recorder received at `log_ns` (ns since 1970).
     pub fn take(&mut self, channel: u16, log_ns: u64, message: &[u8]) {
         let stream = self.channels.get(&channel).and_then(|i| self.streams.get_mut(*i));
         let Some(stream) = stream else { return };
@@ -174,7 +176,7 @@ impl<'w> Streams<'w> {
             stream.unfit += 1;
             return;
         }
-        // Times count from a whole second, so that their differences are exact to a nanosecond.
+        // Times count from a whole second, which keeps their differences exact to a nanosecond.
         let base = *self.log_epoch_s.get_or_insert(log_ns / 1_000_000_000);
         let log_s = (i128::from(log_ns) - i128::from(base) * 1_000_000_000) as f64 * 1e-9;
         let [sec, nanosec, timestamp, sampled] = [0, 1, 2, 3].map(|i| self.values[i]);
@@ -187,7 +189,7 @@ impl<'w> Streams<'w> {
         let own = &mut self.clocks[clock];
         let time_s = if whole_s + rest_s > 0.0 {
             let epoch = *own.epoch_s.get_or_insert(match whole_s > SINCE_1970_S {
-                // The first message may not be the earliest one.
+                // the first message may not be the earliest one, so that times count from one second earlier
                 true => whole_s - 1.0,
                 false => 0.0,
             });
@@ -199,7 +201,8 @@ impl<'w> Streams<'w> {
         topic.push(time_s, &self.values[STAMPS.len()..]);
     }
 
-    /// The flights of the bag: one for each vehicle with an attitude, or one for all topics.
+    /// The flights of the bag: one for each vehicle with an attitude. If there is at most one vehicle, one flight has all
+    /// topics.
     pub fn finish(self, mut findings: Vec<Finding>) -> Vec<Topics> {
         findings.extend(self.said().into_iter().map(Finding::warning));
         let mut vehicles: BTreeMap<String, Vec<Stream>> = BTreeMap::new();
@@ -217,7 +220,7 @@ impl<'w> Streams<'w> {
         vehicles.into_iter().map(one).collect()
     }
 
-    /// Texts about messages that were left out, and about jumps of the stamps.
+    /// Texts about messages that were left out, and about removed jumps of the stamps.
     fn said(&self) -> Vec<String> {
         let mut said = Vec::new();
         if self.orphans + self.unreadable > 0 {
@@ -258,11 +261,11 @@ impl Stream {
     }
 }
 
-/// Name of a field that stands for any field of a topic.
+/// Field name that stands for any field of a topic.
 pub(super) const ANY: &str = "";
 
-/// The plan for a channel's messages; `None` if it has no definition. The error is the reason why they cannot be
-/// read.
+/// The plan for reading a channel's messages; `None` if the channel has no definition. The error is the reason why the messages
+/// cannot be read.
 fn planned(
     schema: Option<&Schema>,
     encoding: &str,
@@ -303,7 +306,7 @@ fn named(topic: &str, kind: &str) -> (String, String) {
     }
 }
 
-/// The topics of a flight. Topics with the same name become its instances, in the order of the file.
+/// Collects the topics of a flight. Topics with the same name become instances of one topic, in the order of the file.
 fn topics(streams: Vec<Stream>, findings: Vec<Finding>, life: Option<String>) -> Topics {
     let mut out = Topics { life, findings, ..Topics::default() };
     out.findings.extend(streams.iter().filter_map(Stream::said).map(Finding::warning));

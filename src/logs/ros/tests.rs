@@ -1,4 +1,4 @@
-//! Compares bags that `tests/data/ros/make.py` wrote with the flight from which it made them.
+//! Compares the flights in ROS 2 bags with the flight from which `tests/data/ros/make.py` made these bags.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ fn bag(name: &str) -> Vec<u8> {
     std::fs::read(data("ros").join(name)).unwrap()
 }
 
-/// The rows of the flight that are in the bags.
+/// The rows of the original flight that are in the bags.
 fn truth() -> Vec<Sample> {
     let log = load(&data("odd_logs/good.csv"), &Options::default()).unwrap();
     log.flight.samples.into_iter().take(800).step_by(4).collect()
@@ -25,12 +25,13 @@ fn said(log: &Log) -> String {
     log.findings.iter().map(|f| format!("{f}\n")).collect()
 }
 
-/// The first rows of a log as text, so that two missing values are equal.
+/// The first rows of a log as text. In this form, two missing values (NaN) are equal.
 fn table(log: &Log, rows: usize) -> String {
     log.flight.samples[..rows].iter().map(|s| format!("{s:?}\n")).collect()
 }
 
-/// The largest differences from the true flight: of the airspeed, then of all other columns.
+/// The largest absolute differences between the log and the original flight: first that of the airspeed, then that over all
+/// other columns. Altitudes are multiplied by 0.01.
 fn differences(log: &Log, truth: &[Sample]) -> [f64; 2] {
     let start = log.flight.samples[0].time_s - truth[0].time_s;
     let mut worst = [0.0_f64; 2];
@@ -73,7 +74,8 @@ fn a_bag_of_px4_msgs_is_the_flight_that_it_was_made_of() {
     );
     assert_eq!(log.vehicle.as_ref().map(|v| v.kind), Some(Kind::FixedWing));
     assert!(log.findings.iter().all(|f| f.severity == Severity::Note), "{}", said(&log));
-    // The limit is single precision at 25 m/s, and at 600 m times 0.01.
+    // The limit is the precision of single-precision numbers of the size 25 (airspeed, m/s) and 6 (600 m of altitude times
+    // 0.01).
     let [airspeed, others] = differences(&log, &truth);
     assert!(airspeed < 2e-6 && others < 2e-6, "{airspeed} {others}");
     // An image that fills several chunks is counted and skipped.
@@ -91,7 +93,7 @@ fn a_bag_of_mavros_is_turned_from_its_axes_into_those_of_the_table() {
     assert_eq!(log.flight.samples.len(), truth.len(), "{}", said(&log));
     assert!(log.findings.iter().all(|f| f.severity == Severity::Note), "{}", said(&log));
     let [airspeed, others] = differences(&log, &truth);
-    // The constants of the two standard atmospheres differ in their sixth digit.
+    // The program that made the bags and Greylag use standard atmospheres whose constants differ in the sixth digit.
     assert!(airspeed < 3e-4 && others < 3e-6, "{airspeed} {others}");
     let big = parse(&bag("mavros_big_endian.zstd.mcap"), Path::new("b"), &Options::default());
     assert_eq!(table(&big.unwrap(), 30), table(&log, 30));
@@ -105,7 +107,7 @@ fn a_mapping_names_topics_and_fields_of_a_bag() {
     let options = Options { mapping, ..Options::default() };
     let log = parse(&bag("mavros.lz4.mcap"), Path::new("b"), &options).unwrap();
     for (s, t) in log.flight.samples.iter().zip(truth()) {
-        // A pulse is a whole number of microseconds.
+        // Servo pulses are whole numbers of microseconds.
         assert!((s.throttle_cmd - t.throttle_cmd).abs() <= 5.1e-4 && s.beta_rad == 0.0, "{s:?}");
     }
 }
@@ -122,7 +124,7 @@ fn two_vehicles_in_one_bag_are_two_flights() {
     );
 }
 
-/// Reads a bag that is damaged.
+/// Reads a damaged bag, which must not fail.
 fn damaged(bytes: &[u8]) -> Log {
     parse(bytes, Path::new("damaged.mcap"), &Options::default()).unwrap()
 }
@@ -160,7 +162,7 @@ fn damage_costs_a_chunk_and_is_counted() {
         let whole = bag(name);
         let sound = damaged(&whole);
         let mut noticed = 0;
-        // Only the first chunk has the definitions. Without them no topic could be read, so it stays undamaged.
+        // The first chunk stays undamaged: it alone has the definitions, without which no topic can be read.
         for tenths in 2..8 {
             let at = whole.len() * tenths / 10;
             let mut spoiled = whole.clone();
@@ -171,7 +173,7 @@ fn damage_costs_a_chunk_and_is_counted() {
                 let log = damaged(&bytes);
                 let text = said(&log);
                 noticed += usize::from(warned(&text));
-                // Damage to the index of a chunk has no effect, because it is not needed.
+                // The index of a chunk is not read, so its damage has no effect.
                 let same =
                     log.flight.samples.len() == 200 && table(&log, 200) == table(&sound, 200);
                 assert!(warned(&text) || same, "{name} at {at}: {text}");
@@ -180,7 +182,7 @@ fn damage_costs_a_chunk_and_is_counted() {
         }
         assert!(noticed > 7, "{name}: {noticed}");
     }
-    // The remaining messages are correct.
+    // The messages outside the damaged chunk must be correct.
     let mut bytes = bag("px4.zstd.mcap");
     bytes[25_000] ^= 0x40;
     let log = damaged(&bytes);

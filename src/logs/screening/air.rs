@@ -1,4 +1,4 @@
-//! Checks of airspeed, vanes, climb and density: units and signs.
+//! Checks of a log for wrong units and signs of airspeed, vanes (angle of attack and sideslip), altitude and air density.
 
 use super::cured;
 use super::relation::{
@@ -12,20 +12,20 @@ use greylag_physics::atmosphere::{STANDARD_GRAVITY, standard_density};
 const SPEEDS: [(&str, f64); 3] = [("km/h", 1.0 / 3.6), ("knots", 0.514_444), ("ft/s", 0.3048)];
 /// Metres in a foot.
 const FOOT: f64 = 0.3048;
-/// Window over which altitude and climb are compared, s.
+/// Length of the windows over which the change of altitude is compared with the integral of the climb rate, s.
 const CLIMB_S: f64 = 2.0;
-/// Largest interquartile range, relative to the median, of the ratios of airspeed to ground speed. A larger range
-/// shows wind.
+/// Largest interquartile range, relative to the median, of the ratios of airspeed to ground speed. If it is larger, wind affects
+/// the ratios and they are not used.
 const GROUND_SPREAD: f64 = 0.25;
-/// The same limit for the ratios in turns, where a larger range comes from manoeuvres.
+/// The same limit for the ratios of airspeed to the airspeed computed from turns, which manoeuvres spread.
 const TURN_SPREAD: f64 = 0.5;
-/// Correlation above which a relation is taken as certain.
+/// Magnitude of the correlation above which a regression is used.
 const CERTAIN: f64 = 0.8;
 /// The column of a vane is in degrees if more than 5 % of its values exceed this, rad.
 const VANE_LARGE: f64 = 1.0;
 
-/// Checks of airspeed, vanes, climb and density. Vanes turn freely on the ground, so they are checked in the rows
-/// `flown` only.
+/// Makes the checks of this module on `rows`. The vanes turn freely on the ground, so they are checked only in `flown`, the rows
+/// in flight.
 pub fn check(rows: &[Sample], flown: &[Sample]) -> Vec<Finding> {
     let airspeed = airspeed(rows);
     let speed_is_right = airspeed.is_none();
@@ -35,8 +35,8 @@ pub fn check(rows: &[Sample], flown: &[Sample]) -> Vec<Finding> {
     out
 }
 
-/// Checks the unit of the airspeed. Steady turns give the airspeed without wind, V = g tan φ / ψ̇. The velocity over
-/// ground gives it if the wind is weak.
+/// Checks the unit of the airspeed. A steady turn gives the airspeed V = g tan φ / ψ̇, whatever the wind. The velocity over
+/// ground is compared with it only if the wind is weak.
 fn airspeed(rows: &[Sample]) -> Option<Finding> {
     let by_turns = steady(&values(rows, by_turn), TURN_SPREAD);
     let ground = values(rows, |s| {
@@ -47,7 +47,7 @@ fn airspeed(rows: &[Sample]) -> Option<Finding> {
         .or_else(|| other_unit(steady(&ground, GROUND_SPREAD), "the velocity over ground shows"))
 }
 
-/// The median of `ratios`; `None` if their interquartile range exceeds `spread` times the median.
+/// The median of `ratios`; `None` if their interquartile range reaches `spread` times the median.
 fn steady(ratios: &[f64], spread: f64) -> Option<f64> {
     let [low, middle, high] = [0.25, 0.5, 0.75].map(|q| quantile(ratios, q));
     middle.filter(|m| high.zip(low).is_some_and(|(high, low)| high - low < spread * m))
@@ -95,8 +95,9 @@ fn vanes(rows: &[Sample]) -> Vec<Finding> {
         .collect()
 }
 
-/// Compares the altitude with the integral of the climb rate, from the velocity over ground, or from airspeed and
-/// pitch.
+/// Compares the change of altitude with the integral of the climb rate. The climb rate comes from the velocity over ground, and
+/// from airspeed, pitch and angle of attack. If there is no finding, the air density is checked. `speed_is_right` states whether
+/// the check of the airspeed found nothing.
 fn climb(rows: &[Sample], speed_is_right: bool) -> Option<Finding> {
     let windows = windows(rows, CLIMB_S);
     let height = |w: &&[Sample]| change(w, |s| s.altitude_m);
@@ -133,7 +134,7 @@ fn climb(rows: &[Sample], speed_is_right: bool) -> Option<Finding> {
     density(rows)
 }
 
-/// Compares a logged density with the standard atmosphere at the logged altitude.
+/// Compares the logged air density with that of the standard atmosphere at the logged altitude.
 fn density(rows: &[Sample]) -> Option<Finding> {
     let ratio = |foot: f64| {
         quantile(

@@ -1,4 +1,4 @@
-//! Checks of the attitude against the body rates: units and signs.
+//! Compares the attitude with the body rates to find wrong units and signs. A finding is a message to the user of a log.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,15 +12,15 @@ use crate::finding::Finding;
 const DEGREE: f64 = PI / 180.0;
 /// Window over which angles and rates are compared, s.
 const WINDOW_S: f64 = 0.5;
-/// Correlation above which a relation between an angle and a rate is taken as certain.
+/// Correlation between the change of an angle and the integral of a rate above which their relation is taken as certain.
 const CERTAIN: f64 = 0.8;
 
-/// Largest pitch angle at which φ̇ is close enough to p for a comparison of their scales, rad.
+/// Largest pitch angle at which φ̇ is close enough to p for a comparison of their magnitudes, rad.
 const GENTLE: f64 = 0.5;
 
-/// Checks the units, then the signs. Signs are checked only if the units are right, because their equations contain
-/// sines of the angles. The scale of roll relative to p is checked in flight only, because on the ground both are
-/// noise.
+/// Checks the units, then the signs. Signs are checked only if the units are right, because the equations for them contain
+/// sines of the angles. If `flies` is true, the magnitude of the roll changes is also compared with p. On the ground both
+/// are noise.
 pub fn check(rows: &[Sample], flies: bool) -> Vec<Finding> {
     let windows = windows(rows, WINDOW_S);
     let units = units(rows, &windows);

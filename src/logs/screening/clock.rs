@@ -1,11 +1,12 @@
-//! Check of the clock: seconds, milliseconds, microseconds or nanoseconds.
+//! Checks whether the times of a log are in seconds, or in milliseconds, microseconds or nanoseconds.
 
 use super::cured;
 use super::relation::{near, quantile, through_origin, values};
 use crate::Sample;
 use crate::finding::Finding;
 
-/// Median time between rows above which the clock is checked, s. A log of 1 Hz is unusable anyway.
+/// Median difference between the times of two rows from which the unit of time is checked, s. With one row per second, a log
+/// would be unusable even if its times were in seconds.
 const SUSPICIOUS_S: f64 = 0.9;
 /// Number of rows over which the change of roll is compared with the integral of the roll rate.
 const SPAN: usize = 20;

@@ -1,19 +1,22 @@
-//! Corrections are verified before they are reported: the column is rescaled and checked again.
+//! Checks the corrections of a log before they are reported: a column is multiplied by the factor and checked again.
+//!
+//! A finding is a defect of the log, such as a wrong unit. Its correction is a factor for a column.
 
 use crate::Sample;
 use crate::columns::{COLUMNS, index};
 use crate::finding::{Cure, Finding};
 
-/// Groups of columns to which one correction applies. A finding names the first column of a group.
+/// Groups of columns to which one correction of a unit applies. A finding names the first column of a group.
 const LIKEWISE: [&[&str]; 3] = [
     &["roll_rad", "pitch_rad", "yaw_rad"],
     &["p_radps", "q_radps", "r_radps"],
     &["ax_mps2", "ay_mps2", "az_mps2"],
 ];
-/// Text between the problem and its correction.
+/// Text between the defect and its correction in a finding.
 const BETWEEN: &str = ": ";
 
-/// Removes ineffective corrections from `findings`: those after which `check` finds the same column wrong again.
+/// Removes ineffective corrections from `findings`. A correction is ineffective if `check` finds the corrected column wrong
+/// again.
 pub fn tried(
     findings: Vec<Finding>,
     rows: &[Sample],
@@ -36,7 +39,7 @@ pub fn tried(
     findings.into_iter().map(one).collect()
 }
 
-/// The rows after the correction.
+/// A copy of `rows` to which the correction `cure` is applied.
 fn mended(rows: &[Sample], cure: &Cure) -> Vec<Sample> {
     let group = LIKEWISE.iter().find(|group| group[0] == cure.column && cure.scale > 0.0);
     let own = [cure.column.as_str()];

@@ -6,7 +6,7 @@ use crate::Sample;
 use crate::columns::{BLOCK, COLUMNS, NEEDED};
 use crate::finding::Finding;
 
-/// Findings about columns that are constant though they should change.
+/// Findings about measured columns that are constant in all rows.
 pub fn check(rows: &[Sample]) -> Vec<Finding> {
     let mut seen = COLUMNS.map(|_| Seen::default());
     for block in rows.chunks(BLOCK) {
@@ -45,8 +45,8 @@ fn dead(seen: &Seen, name: &'static str) -> Option<Finding> {
     Some(if needed { Finding::problem(text) } else { Finding::warning(text) })
 }
 
-/// A problem if the commands of aileron and elevator are constant in flight. Another channel or instance then has the
-/// commands that fly the aircraft.
+/// Returns a problem if the commands of aileron and elevator are constant in flight and no recorded deflection of these surfaces
+/// changes. The commands that fly the aircraft are then in another channel or instance.
 pub fn commands(flown: &[Sample]) -> Option<Finding> {
     let rests = |name: &str| {
         let get = COLUMNS.iter().find(|c| c.0 == name).map(|c| c.1)?;
@@ -71,8 +71,8 @@ pub fn commands(flown: &[Sample]) -> Option<Finding> {
     )))
 }
 
-/// Whether a column may be constant in a good log, such as a command, a target, an absent rudder or a declared
-/// sampling.
+/// Whether a column may be constant in a correct log. Examples are commands, targets, an absent rudder and the declared sampling
+/// of the rates.
 fn may_rest(name: &str) -> bool {
     name.ends_with("_cmd")
         || name.ends_with("_target_rad")

@@ -1,4 +1,4 @@
-//! Checks of the accelerometers: unit and sign of each axis.
+//! Checks of the accelerometers in a log: the unit, and the sign of each axis.
 
 use super::cured;
 use super::relation::{change, mean, quantile, values, windows, with_intercept};
@@ -7,17 +7,18 @@ use crate::finding::Finding;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 
 const G: f64 = STANDARD_GRAVITY;
-/// Window over which accelerations are compared, s.
+/// Time over which measured and expected values are averaged before they are compared, s.
 const WINDOW_S: f64 = 1.0;
-/// Largest bank and pitch angle (rad) and largest body rate (rad/s) of about level flight.
+/// Largest bank and pitch angle (rad) and largest body rate (rad/s) at which flight counts as level.
 const LEVEL: [f64; 2] = [0.8, 0.5];
 const LEVEL_RATE: f64 = 1.0;
-/// Magnitude of the specific force in about level flight, g.
+/// Magnitude of the specific force at which flight counts as level, g.
 const CARRIED: std::ops::Range<f64> = 0.5..1.5;
-/// Correlation below which a sign is called wrong.
+/// A sign counts as wrong if the correlation of the measured with the expected values is below this value.
 const TURNED: f64 = -0.7;
 
-/// Findings on unit and sign of the measured specific force.
+/// Findings on the unit and the signs of the measured specific force. At most one kind is returned: a wrong unit, or a wrong
+/// sign of z, or wrong signs of x and y.
 pub fn check(rows: &[Sample]) -> Vec<Finding> {
     let size = |s: &Sample| s.specific_force_mps2.iter().map(|a| a * a).sum::<f64>().sqrt();
     let Some(middle) = quantile(&values(rows, size), 0.5) else { return Vec::new() };
@@ -47,8 +48,8 @@ fn unit(middle: f64) -> Option<(&'static str, f64)> {
     }
 }
 
-/// Whether the aircraft is about level and has a load factor of about one, so that the specific force shows the
-/// direction of z. In a dive or a tumble it may point down for long. Unknown angles count as level.
+/// Whether the aircraft is roughly level with a load factor of roughly one. Only then does the sign of the specific force show
+/// the direction of the z axis. Unknown angles count as level.
 fn is_level(s: &Sample) -> bool {
     let size = s.specific_force_mps2.iter().map(|a| a * a).sum::<f64>().sqrt();
     let beyond = (0..2).any(|i| s.attitude_rad[i].abs() > LEVEL[i]);
@@ -73,7 +74,7 @@ fn vertical(rows: &[Sample]) -> Option<Finding> {
     })
 }
 
-/// Whether r is negative in banks to the right: ψ̇ = g tan φ / V in coordinated flight.
+/// Whether the yaw rate r is negative at bank to the right. In coordinated flight it is positive, because ψ̇ = g tan φ / V.
 fn turns_left(rows: &[Sample]) -> bool {
     let pairs = windows(rows, WINDOW_S)
         .into_iter()
@@ -81,8 +82,8 @@ fn turns_left(rows: &[Sample]) -> bool {
     with_intercept(pairs).is_some_and(|r| r.correlation < TURNED)
 }
 
-/// Signs of ax and ay against the equations of motion in still air, body axes: f_x = u̇ + q w − r v + g sin θ and
-/// f_y = v̇ + r u − p w − g sin φ cos θ.
+/// Findings on the signs of ax and ay. The measured values are compared with those that follow from the equations of motion in
+/// still air, in body axes: f_x = u̇ + q w − r v + g sin θ and f_y = v̇ + r u − p w − g sin φ cos θ.
 fn along_and_across(rows: &[Sample]) -> Vec<Finding> {
     let windows = windows(rows, WINDOW_S);
     let body = |s: &Sample| {

@@ -1,9 +1,9 @@
 //! Screening: wrong units, signs and axes, found before anything is computed from a log.
 //!
 //! Each check uses a relation that holds for every aeroplane whatever its coefficients: Euler angles are the integral
-//! of the body rates, a steady turn has V ψ̇ = g tan φ, altitude is the integral of the climb, a surface accelerates
-//! the aircraft in its own direction. A finding names the column and the mapping that corrects it. No column is
-//! converted without a mapping.
+//! of the body rates, a steady turn has V ψ̇ = g tan φ, altitude is the integral of the climb rate, a positive aileron
+//! rolls to the right. A finding names the column and the mapping that corrects it. No column is converted without a
+//! mapping.
 
 mod air;
 mod angles;
@@ -24,7 +24,7 @@ use super::phases::{self, Flying, PhaseKind};
 /// Smallest number of rows for checks of units.
 const ENOUGH: usize = 50;
 
-/// All findings about `rows`. `flies` are the criteria for flight.
+/// Returns all findings about `rows`. `flies` states when the aircraft counts as flying.
 pub fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
     if rows.is_empty() {
         return vec![Finding::problem("the log has no rows with all needed channels")];
@@ -82,7 +82,7 @@ fn in_flight<'a>(rows: &'a [Sample], flies: &Flying) -> Cow<'a, [Sample]> {
     }
 }
 
-/// A problem if the log has no flight, or if its flight time is too short; else `None`.
+/// Returns a problem if the log has no flight, or if its flight time is too short.
 fn flight(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     let flights: Vec<_> =
         phases::phases(rows, flies).into_iter().filter(|p| p.kind == PhaseKind::Flight).collect();

@@ -1,26 +1,26 @@
-//! Relations between columns: windows of a log, regressions over them.
+//! Tools for relations between the columns of a log: short windows of rows, integrals over them, and regressions.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::Sample;
 use greylag_num::statistics;
 
-/// A gap of this many median periods ends a window.
+/// A gap of at least this many median sample periods ends a window.
 const PAUSE_PERIODS: f64 = 5.0;
 /// Smallest number of pairs for a regression.
 const FEWEST: usize = 12;
 
-/// The finite values of a column.
+/// The finite values of `get` over `rows`.
 pub fn values(rows: &[Sample], get: impl Fn(&Sample) -> f64) -> Vec<f64> {
     rows.iter().map(get).filter(|x| x.is_finite()).collect()
 }
 
-/// Largest bank and pitch angle (rad), and largest pitch and yaw rate (rad/s), at which the sign of a column is
-/// judged.
+/// Largest bank and pitch angle (rad) at which a row is used to check the sign of a column. `TAME_RATE` is the largest pitch and
+/// yaw rate (rad/s).
 const TAME: [f64; 2] = [1.3, 0.7];
 const TAME_RATE: f64 = 3.0;
 
-/// Whether attitude and body rates are moderate; unknown ones count as moderate.
+/// Whether attitude and body rates are within these limits. A missing value counts as within them.
 pub fn tame(s: &Sample) -> bool {
     let beyond = |x: f64, limit: f64| x.abs() > limit;
     let attitude = (0..2).any(|i| beyond(s.attitude_rad[i], TAME[i]));
@@ -28,7 +28,7 @@ pub fn tame(s: &Sample) -> bool {
     !attitude && !rates
 }
 
-/// Quantile `q` of the values; `None` for fewer than [`super::ENOUGH`].
+/// Quantile `q` of `values`; `None` if there are fewer than [`super::ENOUGH`].
 pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
     (values.len() >= super::ENOUGH).then(|| statistics::quantile(values, q))
 }
@@ -38,7 +38,7 @@ pub fn near(x: f64, target: f64, tolerance: f64) -> bool {
     (x / target - 1.0).abs() < tolerance
 }
 
-/// Consecutive windows of about `length_s` (s), without gaps in them.
+/// Consecutive windows of about `length_s` (s). No window contains a gap.
 pub fn windows(rows: &[Sample], length_s: f64) -> Vec<&[Sample]> {
     let times = values(rows, |s| s.time_s);
     let periods: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).filter(|p| *p > 0.0).collect();
@@ -80,9 +80,9 @@ pub fn change(window: &[Sample], value: impl Fn(&Sample) -> f64) -> f64 {
 /// Result of a regression of y on x.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relation {
-    /// Slope dy/dx.
+    /// Slope dy/dx of the fitted line.
     pub slope: f64,
-    /// Correlation coefficient, −1..1.
+    /// Correlation coefficient of x and y, −1..1.
     pub correlation: f64,
 }
 
@@ -107,8 +107,9 @@ fn relation(pairs: Vec<(f64, f64)>) -> Option<Relation> {
         .then(|| Relation { slope: xy / xx, correlation: xy / (xx * yy).sqrt() })
 }
 
-/// The partial correlation of y with the last regressor of each row, all others and a constant being partialled out
-/// (Frisch–Waugh–Lovell). `None` for too few rows, or if the others determine the last regressor.
+/// The partial correlation of y with the last regressor, with the other regressors and a constant partialled out
+/// (Frisch–Waugh–Lovell). Each row has the regressors and y. `None` for too few rows, or if the other regressors determine the
+/// last one.
 pub fn partial_correlation(rows: &[(Vec<f64>, f64)]) -> Option<f64> {
     let width = rows.first()?.0.len();
     if rows.len() < 10 * width {

@@ -1,4 +1,5 @@
-//! Checks of surfaces and throttle: units, and whether a surface accelerates the aircraft in the right direction.
+//! Checks of surfaces and throttle: their units, and whether a surface accelerates the aircraft in the right direction. A
+//! finding is a message to the user of a log.
 
 use super::cured;
 use super::relation::{change, mean, partial_correlation, quantile, tame, values, windows};
@@ -6,18 +7,18 @@ use crate::Sample;
 use crate::finding::Finding;
 use crate::phases::Flying;
 
-/// A column is in degrees if more than 1 % of its values exceed this, rad (69°).
+/// A deflection column counts as in degrees if more than 1 % of its magnitudes exceed this value, rad (69°).
 const DEFLECTION_LARGE: f64 = 1.2;
-/// Magnitude above which a command cannot be normalised to −1..1.
+/// A command or throttle column counts as not normalised if more than 1 % of its magnitudes exceed this value.
 const COMMAND_LARGE: f64 = 1.5;
 /// Time span over which angular accelerations are computed, s.
 const WINDOW_S: f64 = 0.1;
-/// Partial correlation beyond which a surface is reported as reversed.
+/// Magnitude of the partial correlation with the wrong sign above which a surface is reported as reversed.
 const TURNED: f64 = 0.6;
 
 type Get = fn(&Sample) -> f64;
 
-/// Checks the units, then the polarity if units and axes are right.
+/// Checks the units and, if units and axes are right, the directions in which aileron and elevator act.
 pub fn check(rows: &[Sample], axes_are_right: bool, flies: &Flying) -> Vec<Finding> {
     let mut out: Vec<Finding> = units(rows);
     if out.is_empty() && axes_are_right {
@@ -76,7 +77,8 @@ fn throttle(column: &str, size: f64) -> Finding {
     }
 }
 
-/// Checks the polarity of the aileron by a regression of ṗ on p, r, β and the aileron. Positive is right wing down.
+/// Checks the direction of the aileron by a regression of ṗ on p, r, β (if known) and the aileron. Positive aileron must
+/// accelerate the right wing downwards.
 fn aileron(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     let (column, get) =
         moving(rows, [("aileron_rad", |s| s.aileron_rad), ("aileron_cmd", |s| s.aileron_cmd)])?;
@@ -93,8 +95,8 @@ fn aileron(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     })
 }
 
-/// Checks the polarity of the elevator by a regression of q̇ on q, α and the elevator. Without α the normal force
-/// takes its place. Positive is nose down.
+/// Checks the direction of the elevator by a regression of q̇ on q, α and the elevator. If α is unknown, the specific force
+/// along body z divided by V² takes its place. Positive elevator must accelerate the nose downwards.
 fn elevator(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     let (column, get) =
         moving(rows, [("elevator_rad", |s| s.elevator_rad), ("elevator_cmd", |s| s.elevator_cmd)])?;
@@ -110,7 +112,7 @@ fn elevator(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     })
 }
 
-/// Whether more than half of the rows have the column.
+/// Whether more than half of the rows have a value in the column.
 fn has(rows: &[Sample], get: Get) -> bool {
     2 * values(rows, get).len() > rows.len()
 }
@@ -123,7 +125,8 @@ fn moving(rows: &[Sample], columns: [(&'static str, Get); 2]) -> Option<(&'stati
     })
 }
 
-/// The partial correlation of the angular acceleration about `axis` with the last regressor.
+/// The partial correlation of the angular acceleration about `axis` with the last regressor. It is computed over windows in
+/// flight with moderate attitudes and rates.
 fn polarity(
     rows: &[Sample],
     flies: &Flying,

@@ -1,12 +1,12 @@
-//! The usable samples of a channel: finite values at increasing times.
+//! Selects the usable samples of a channel of a log: those with finite values at increasing times.
 
 use std::borrow::Cow;
 
-/// A time is damaged if it is later than the next two times by more than this, s.
+/// A time counts as damaged if the next two times are earlier by more than this, s.
 const AHEAD_S: f64 = 1.0;
 
-/// Returns the samples with finite values at increasing times. The topic's own times are borrowed if all samples are
-/// so.
+/// Returns the times and the values of the samples with finite values at increasing times. `all_times` has the time of each
+/// sample, and each entry of `all` one value per sample. If all samples are usable, `all_times` is borrowed.
 pub(super) fn cleaned(all_times: &[f64], all: Vec<Vec<f64>>) -> (Cow<'_, [f64]>, Vec<Vec<f64>>) {
     let increasing = all_times.windows(2).all(|w| w[0] < w[1]);
     let finite = |values: &[f64]| values.iter().all(|x| x.is_finite());
@@ -26,8 +26,8 @@ pub(super) fn cleaned(all_times: &[f64], all: Vec<Vec<f64>>) -> (Cow<'_, [f64]>,
     (Cow::Owned(times), series)
 }
 
-/// Whether the first of `times` is damaged: far ahead of the next two, which continue from `last` (s). If such a time
-/// were kept, the samples after it would be dropped as out of order.
+/// Whether the first of `times` is damaged: it is far ahead of the next two, and these are later than `last` (s), the last time
+/// that was kept. If a damaged time were kept, the samples after it would be dropped as out of order.
 fn is_ahead(times: &[f64], last: f64) -> bool {
     let [t, next @ ..] = times else { return false };
     let continues = |next: &f64| *next > last && *next < t - AHEAD_S;
@@ -47,7 +47,7 @@ mod tests {
         let (kept, series) = cleaned(&times, values);
         assert_eq!((kept.len(), series[0].len()), (98, 98));
         assert!(kept.windows(2).all(|w| w[0] < w[1]) && series[0][40] == 41.0);
-        // After a restart of the clock the samples are dropped, because they belong to another recording.
+        // the samples after a restart of the clock are dropped, because they belong to another recording
         let again: Vec<f64> = (0..100).map(|k| f64::from(k % 50)).collect();
         let (kept, _) = cleaned(&again, vec![vec![0.0; 100]]);
         assert_eq!(kept.len(), 50);

@@ -1,21 +1,22 @@
-//! Statistics of a whole log of which only stretches are kept.
+//! Statistics of a whole log. If a log is only inspected, stretches of 30 s are kept in memory of topics with many samples.
 
 use super::{Track, fill, make_true, track_of};
 use crate::Sample;
 use crate::stretches::{LENGTH_S, Stretches};
 use crate::topics::Topics;
 
-/// Statistics of a whole log of which the table keeps only stretches.
+/// Statistics of all samples of a log, although the table holds only stretches of it.
 pub(crate) struct Whole {
-    /// The stretches, whose `phases` are still empty.
+    /// Statistics of the stretches. Their `phases` are still empty.
     pub stretches: Stretches,
-    /// Airspeed, air density and altitude of the whole log, at least one row a second.
+    /// Airspeed, air density and altitude of the whole log. There is one row a second if only stretches of the airspeed are
+    /// kept, else one row for each airspeed sample.
     pub air: Vec<Sample>,
 }
 
 impl Whole {
-    /// Statistics of the whole log. `base` is the track whose times the table has. `None` if all samples of `base`
-    /// are kept.
+    /// Statistics of the whole log. A track is the data of one column. `base` is the track whose times are the times of the
+    /// table. `None` if all samples of `base` are kept.
     pub(super) fn of(base: &Track<'_>, topics: &Topics, tracks: &[Track<'_>]) -> Option<Whole> {
         let watch = base.watch()?;
         let stretches = Stretches {

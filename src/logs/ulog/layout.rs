@@ -1,4 +1,4 @@
-//! Positions of the fields in a ULog message.
+//! Positions of the fields in a ULog message, from the message formats in the log's header.
 
 use std::collections::BTreeMap;
 
@@ -24,9 +24,9 @@ pub(super) struct Layout {
     /// Types and positions of `timestamp` and `timestamp_sample`.
     pub stamp: Option<(Number, usize)>,
     pub sampled: Option<(Number, usize)>,
-    /// Bytes of a record's fields without the padding at the end, which PX4 does not write.
+    /// Length of a record in bytes, without the padding at its end. PX4 does not write this padding.
     pub size: usize,
-    /// Bytes of a record's fields with that padding.
+    /// Length of a record in bytes, with this padding.
     pub padded: usize,
 }
 
@@ -79,7 +79,7 @@ fn flatten(
                 None => {
                     let before = *offset;
                     flatten(formats, kind, &format!("{path}."), depth, offset, out);
-                    // A field of unknown type: the positions of the fields after it are unknown.
+                    // The field has an unknown type, so the positions of the fields after it are unknown.
                     if *offset == before {
                         return;
                     }

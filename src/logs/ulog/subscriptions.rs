@@ -1,4 +1,4 @@
-//! The subscriptions of a ULog, which assign a topic to each message number.
+//! The subscriptions of a ULog (a log of PX4). Each record has a message number, and a subscription assigns a topic to it.
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -7,7 +7,7 @@ use super::RECORD;
 use super::layout::Layout;
 use crate::topics::Topic;
 
-/// The topic of one message number.
+/// The topic of one message number. `key` is the name of the topic and its instance.
 pub(super) struct Subscription {
     pub key: (String, u16),
     pub layout: Rc<Layout>,
@@ -17,16 +17,15 @@ pub(super) struct Subscription {
 }
 
 impl Subscription {
-    /// Whether a record of `len` bytes has the topic's size; `None` if the size is unknown, because the file lacks the
-    /// topic's format.
+    /// Whether a record of `len` bytes has the size that the topic's format states; `None` if the file lacks the format.
     pub fn fits(&self, len: usize) -> Option<bool> {
         let sizes = RECORD + 2 + self.layout.size..=RECORD + 2 + self.layout.padded;
         (self.layout.size > 0).then(|| sizes.contains(&len))
     }
 }
 
-/// The records of the topics, one series for each topic and instance. All subscriptions of a topic and instance continue
-/// the same series.
+/// The records of the topics, with one series for each topic and instance. All subscriptions of the same topic and instance
+/// add to the same series.
 #[derive(Default)]
 pub(super) struct Series {
     places: BTreeMap<(String, u16), usize>,
@@ -34,7 +33,7 @@ pub(super) struct Series {
 }
 
 impl Series {
-    /// Index of the series of `key`. If there is none yet, it begins with `new`.
+    /// Index of the series of `key`. If there is none yet, `new` makes it.
     pub fn place(&mut self, key: &(String, u16), new: impl FnOnce() -> Topic) -> usize {
         if let Some(place) = self.places.get(key) {
             return *place;
@@ -49,7 +48,7 @@ impl Series {
         &mut self.topics[place]
     }
 
-    /// The series with records, by topic and instance.
+    /// The series that have records, by topic and instance.
     pub fn all(mut self) -> BTreeMap<(String, u16), Topic> {
         let taken = self.places.into_iter();
         let taken = taken.map(|(key, place)| (key, std::mem::take(&mut self.topics[place])));
@@ -57,7 +56,7 @@ impl Series {
     }
 }
 
-/// The subscriptions by message number. Each record needs several look-ups, which are fast here.
+/// The subscriptions by message number. Each record needs several look-ups, so they are made by array index.
 #[derive(Default)]
 pub(super) struct Subscriptions {
     /// Position of each message number in `all`, counted from 1; 0 for a number without a subscription.
@@ -79,7 +78,7 @@ impl Subscriptions {
         Some(&mut self.all[place].1)
     }
 
-    /// Sets the subscription of a number and returns the previous one. After 65,535 numbers a further one is ignored.
+    /// Sets the subscription of `number` and returns the previous one. A new number is ignored if 65,535 others are in use.
     pub fn insert(&mut self, number: u16, new: Subscription) -> Option<Subscription> {
         if let Some(old) = self.get_mut(number) {
             return Some(std::mem::replace(old, new));

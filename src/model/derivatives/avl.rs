@@ -8,7 +8,7 @@
 use super::numbers::Numbers;
 use super::{Column, Control, Derivatives, DerivativesError, Tool, about_body, to_body};
 
-/// Origin of the text, for messages.
+/// Origin of the text, for error messages.
 const FROM: &str = "AVL's command ST (or SB), given in the menu OPER after a run, writes it";
 /// AVL's names of side force, lift, rolling, pitching and yawing moment.
 const NAMES: [&str; 5] = ["CY", "CL", "Cl", "Cm", "Cn"];

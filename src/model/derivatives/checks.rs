@@ -1,20 +1,21 @@
-//! Plausibility checks of derivatives. A tool writes zero for a quantity that it did not compute. Such a value is rejected.
+//! Plausibility checks of stability and control derivatives that an aerodynamic tool has computed. A tool writes zero for a
+//! quantity that it did not compute. Such a value is rejected.
 
 use super::{Tool, Value};
 use crate::textbook::{Measures, Tail};
 
-/// Smallest roll damping as a fraction of the lift slope. Elliptic wings have 1/8, very short wings 1/12.
+/// Smallest −Clp as a fraction of the lift slope. Elliptic wings have 1/8, wings of very small aspect ratio 1/12.
 const ROLL_DAMPING: f64 = 0.02;
-/// Smallest |Cmq| of an aircraft with a tail. Textbook values are −5 and below.
+/// Smallest −Cmq of an aircraft with a tail. Textbook values are 5 and more.
 const PITCH_DAMPING: f64 = 1.0;
-/// Smallest |Cnr| of an aircraft with a tail. A fin alone gives −0.02 and below.
+/// Smallest −Cnr of an aircraft with a tail. A fin alone gives 0.02 and more.
 const YAW_DAMPING: f64 = 8e-3;
-/// Smallest magnitude of a control's moment derivative, 1/rad.
+/// Smallest magnitude of the derivative of a control's primary moment, 1/rad.
 const CONTROL: f64 = 5e-3;
-/// Plausible lift slopes of whole aircraft, 1/rad.
+/// Range of plausible lift slopes of a whole aircraft, 1/rad.
 const SLOPES: std::ops::RangeInclusive<f64> = 1.0..=8.0;
 
-/// Removes the values that `tool` cannot have computed. Returns warnings about these values and about implausible ones.
+/// Removes from `values` those that `tool` cannot have computed. Returns warnings about these and about implausible values.
 pub(super) fn doubtful(tool: Tool, measures: &Measures, values: &mut Vec<Value>) -> Vec<String> {
     let of = |name: &str| values.iter().find(|(full, _)| full.ends_with(name)).map(|(_, x)| *x);
     let slope = of(".CLalpha").unwrap_or(0.0);
@@ -57,7 +58,7 @@ pub(super) fn doubtful(tool: Tool, measures: &Measures, values: &mut Vec<Value>)
     warnings
 }
 
-/// Controls, each with the derivative of its primary moment and with all its derivatives.
+/// The controls. Each has the name of the derivative of its primary moment, and the names of all its derivatives.
 const CONTROLS: [(&str, &str, &[&str]); 3] = [
     ("aileron", ".Clda", &[".CYda", ".Clda", ".Cnda"]),
     ("elevator", ".Cmde", &[".CLde", ".Cmde"]),

@@ -1,9 +1,9 @@
-//! Reader of results of OptVL and AeroSandbox in Python, written as JSON.
+//! Reads aerodynamic derivatives that the Python packages OptVL and AeroSandbox computed, from a JSON file.
 //!
-//! A short Python script writes the file; it is in docs/how-to/add-an-aircraft.md. The keys are the tools' own names and a
-//! few of this program, such as `alpha_deg`. OptVL has names like `dCL/dalpha`, moments about stability axes with a prime
-//! (`dCl'/dp'`), and control derivatives per degree. AeroSandbox has names like `CLa` and moments about body axes. It has no
-//! control derivatives: the script computes them as differences per degree.
+//! A short Python script in docs/how-to/add-an-aircraft.md writes the file. Most keys are the tools' own names. A few, such
+//! as `alpha_deg`, are names of this program. OptVL has names like `dCL/dalpha`. A prime marks moments and rates about
+//! stability axes (`dCl'/dp'`). Its control derivatives are per degree. AeroSandbox has names like `CLa`, and moments about
+//! body axes. It has no control derivatives, so the script computes them as differences per degree.
 
 use std::collections::BTreeMap;
 
@@ -11,8 +11,8 @@ use serde_json::{Map, Value};
 
 use super::{Column, Control, Derivatives, DerivativesError, Tool, about_body, positive, to_body};
 
-/// Content of a document: its numbers at any depth (except those of `controls`), and its entries `controls`, `tool` and
-/// `XYZref`.
+/// Content of a document: its numbers at any depth (except those in `controls`), and its entries `controls`, `tool` and
+/// `XYZref` (moment reference point, of which x and z are stored).
 struct Flat<'a> {
     numbers: BTreeMap<&'a str, f64>,
     controls: Option<&'a Map<String, Value>>,
@@ -20,7 +20,7 @@ struct Flat<'a> {
     point: Option<[f64; 2]>,
 }
 
-/// Reads a JSON document. Control derivatives are converted to 1/rad. `radians` is the document's unit of deflection, in rad.
+/// Reads a JSON document. `radians` is the document's unit of deflection, in rad. Control derivatives are converted to 1/rad.
 pub(super) fn read(text: &str, radians: f64) -> Result<Derivatives, DerivativesError> {
     let flat = document(text)?;
     let flat = Flat::of(&flat)?;

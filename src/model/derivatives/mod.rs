@@ -1,8 +1,8 @@
-//! Stability derivatives computed by aerodynamic tools, and their conversion to an airframe and a model.
+//! Reads stability derivatives that an aerodynamic tool computed, and converts them to an airframe and a model.
 //!
 //! Each tool has its own axes, units and names. Its derivatives are converted to body axes, 1/rad, and nondimensional rates
-//! pb/2V, qc/2V, rb/2V. Each derivative has the standard deviation of its tool ([`widths`]). A derivative that a tool cannot
-//! compute is reported and not used (`checks`).
+//! pb/2V, qc/2V, rb/2V. The assumed standard deviation of a derivative depends on the tool ([`widths`]). A derivative that
+//! the tool cannot compute is reported and not used (`checks`).
 
 mod avl;
 mod checks;
@@ -19,15 +19,15 @@ use super::textbook::{Estimate, Measures, Section};
 /// Data of an aircraft in addition to its derivatives.
 #[derive(Clone, Debug)]
 pub struct Beside {
-    /// Name, mass, tail, travel and thrust. The file's span and area replace the values given here.
+    /// Name, mass, tail, travel and thrust. The span and area in the file of derivatives replace the values given here.
     pub measures: Measures,
-    /// The file's unit of length, m.
+    /// Unit of length in the file of derivatives, m.
     pub metres: f64,
     /// Unit of angle of the control derivatives, rad. AVL's unit is a degree times the control's gain.
     pub radians: f64,
 }
 
-/// Result of the conversion of a file.
+/// Result of the conversion of a file of derivatives.
 #[derive(Clone, Debug)]
 pub struct Read {
     /// Tool that wrote the file.
@@ -58,9 +58,9 @@ pub enum DerivativesError {
     Number {
         /// Name of the number.
         name: String,
-        /// The text that is there instead.
+        /// The text in place of the number.
         text: String,
-        /// Line of the text, from 1.
+        /// Number of the line, counted from 1.
         line: usize,
     },
     /// The JSON is invalid.
@@ -89,7 +89,7 @@ pub enum DerivativesError {
     Reference,
 }
 
-/// Derivatives of side force, lift, rolling, pitching and yawing moment with respect to one variable, in body axes.
+/// Derivatives with respect to one variable: of side force, lift, rolling, pitching and yawing moment, in body axes.
 type Column = [f64; 5];
 
 /// A control and its derivatives, 1/rad, in the tool's sign convention.
@@ -99,16 +99,16 @@ struct Control {
     column: Column,
 }
 
-/// Derivatives of a file, converted to body axes and 1/rad.
+/// Derivatives from a file, converted to body axes and 1/rad.
 struct Derivatives {
     tool: Tool,
     /// Reference area, chord and span, in the file's unit of length.
     reference: [f64; 3],
     /// Moment reference point: x and z in the file's axes. `None` if the file does not state it.
     point: Option<[f64; 2]>,
-    /// Angle of attack of the run, rad.
+    /// Angle of attack at which the tool computed the derivatives, rad.
     alpha: f64,
-    /// Lift and pitching moment coefficients of the run.
+    /// Lift and pitching moment coefficients at this angle of attack.
     totals: [f64; 2],
     by_alpha: Column,
     by_beta: Column,
@@ -164,7 +164,8 @@ pub fn reference(text: &str) -> Result<[f64; 3], DerivativesError> {
     }
 }
 
-/// Reads the `text` of AVL or XFLR5, or the results of OptVL or AeroSandbox as JSON. `beside` has the remaining data.
+/// Converts `text`, which is the output of AVL or XFLR5, or the results of OptVL or AeroSandbox as JSON. `beside` has the
+/// data of the aircraft that the text lacks.
 ///
 /// # Errors
 /// If the text cannot be parsed, a required number is missing or not a number, or the tool is unknown.
@@ -313,7 +314,7 @@ fn slope_and_zero(sections: &[Section]) -> [f64; 2] {
     [value(sections, "lift_linear", "CLalpha"), value(sections, "lift_linear", "CL0")]
 }
 
-/// Recomputes the coefficients of induced drag from the lift derivatives of the file.
+/// Recomputes the coefficients of induced drag in `sections` from the lift coefficients there.
 fn trimmed(sections: &mut [Section], measures: &Measures) {
     let [slope, zero] = slope_and_zero(sections);
     let [linear, square] = measures.induced_by(slope, zero);

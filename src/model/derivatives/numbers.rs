@@ -1,10 +1,10 @@
-//! Parser of texts with `NAME = number`, as written by Fortran and Qt programs.
+//! Parser of texts that contain `NAME = number`, as written by Fortran and Qt programs.
 
 use std::collections::BTreeMap;
 
 use super::DerivativesError;
 
-/// Numbers of a text by name. If a name occurs several times, the first number counts.
+/// The numbers of a text by their names. If a name occurs several times, the first number counts.
 pub(super) struct Numbers(BTreeMap<String, f64>);
 
 impl Numbers {
@@ -14,7 +14,7 @@ impl Numbers {
             let parts: Vec<&str> = line.split('=').collect();
             for pair in parts.windows(2) {
                 let name = pair[0].split_whitespace().next_back().unwrap_or_default();
-                // XFLR5 writes "…the weight...VInf = 8.6"
+                // XFLR5 writes a text, dots and the name without a space: "…the weight...VInf = 8.6"
                 let name = name.rsplit("...").next().unwrap_or_default();
                 let value = pair[1].split_whitespace().next().unwrap_or_default();
                 // a title in words may contain an equals sign
@@ -43,7 +43,7 @@ impl Numbers {
         self.0.get(name).copied()
     }
 
-    /// The number `name`. The error for a missing number contains `tool`, a text that says which output contains the number.
+    /// The number `name`. If it is missing, the error names `tool`, the output that should contain it.
     pub fn need(&self, name: &str, tool: &'static str) -> Result<f64, DerivativesError> {
         let missing = || DerivativesError::Missing { name: name.into(), tool };
         self.get(name).ok_or_else(missing)

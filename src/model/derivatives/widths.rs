@@ -1,9 +1,9 @@
-//! Relative errors of each tool's derivatives: standard deviations as fractions of the value.
+//! Relative errors of the stability derivatives that aerodynamic tools compute: standard deviations as fractions of the value.
 //!
-//! They are in `params/widths/widths.csv`. They combine a tool's errors on aircraft whose derivatives were identified in
-//! flight or measured in a wind tunnel (`params/widths/measured.csv`, with sources) with a prior guess. The guess counts as
-//! two aircraft, because few were measured: w² = (2 g² + Σ e²) / (2 + n), with the guess g and the relative errors e of n
-//! aircraft. `cargo run --no-default-features --example derivative_widths` computes them.
+//! The errors are read from `params/widths/widths.csv`. They combine two sources. One is the tool's errors on aircraft whose
+//! derivatives were identified in flight or measured in a wind tunnel (`params/widths/measured.csv`, with sources). The other is
+//! a prior guess, which counts as much as two aircraft, because few were measured: w² = (2 g² + Σ e²) / (2 + n), with the guess
+//! g and the relative errors e of n aircraft. `cargo run --no-default-features --example derivative_widths` computes the file.
 
 use std::fmt;
 use std::sync::LazyLock;
@@ -52,8 +52,8 @@ impl Tool {
         }
     }
 
-    /// Name of the family of tools whose errors are used if the tables have none for this tool. AVL, OptVL and XFLR5 form one
-    /// family, because their errors are similar.
+    /// Name of the family of similar tools. Its errors are used if the table has none for this tool. AVL, OptVL and XFLR5 form
+    /// one family, because their errors are similar.
     pub fn family(self) -> &'static str {
         match self {
             Tool::Avl | Tool::OptVl | Tool::Xflr5 => "lattice",
@@ -61,7 +61,7 @@ impl Tool {
         }
     }
 
-    /// Text of a coefficient's source in a model file.
+    /// Text that a model file states as the source of a coefficient.
     pub(super) fn source(self) -> &'static str {
         match self {
             Tool::Textbook => "textbook",
@@ -74,7 +74,7 @@ impl Tool {
         }
     }
 
-    /// Explanation of why a control's derivatives may be zero, and the remedy.
+    /// Text for the user: why the derivatives of `control` may be zero, and what to do.
     pub(super) fn of_controls(self, control: &str) -> String {
         match self {
             Tool::AeroSandboxLattice => format!(
@@ -86,7 +86,7 @@ impl Tool {
         }
     }
 
-    /// Explanation of why a damping derivative may be missing.
+    /// Text for the user: why a damping derivative may be missing.
     pub(super) fn of_damping(self) -> &'static str {
         match self {
             Tool::LiftingLine => "AeroSandbox's lifting line does not model rotation",

@@ -1,8 +1,8 @@
-//! Reader of XFLR5's log of a stability analysis: derivatives with respect to α, β, pb/2V, qc/2V, rb/2V and one control,
-//! in stability axes.
+//! Reader of the log that XFLR5 writes in a stability analysis. It has derivatives with respect to α, β, pb/2V, qc/2V, rb/2V and
+//! one control, in stability axes.
 //!
-//! The log has no reference area, chord and span. The user adds them as `Sref = …`. The analysis is at trim: the lift
-//! balances the weight at the log's airspeed, and the pitching moment is zero.
+//! The log has no reference area, chord and span. The user adds them as `Sref = …`, `Cref = …` and `Bref = …`. The analysis is
+//! made at trim: the lift balances the weight at the log's airspeed, and the pitching moment is zero.
 
 use super::numbers::Numbers;
 use super::{Column, Control, Derivatives, DerivativesError, Tool, about_body, to_body};
@@ -11,7 +11,7 @@ use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 const FROM: &str = "it stands in the log of XFLR5's stability analysis (\"Longitudinal derivatives\" and below), and \
                     Sref, Cref and Bref are to be added on top as \"Sref = 0.45\"";
 
-/// Whether the text is a log of XFLR5.
+/// Whether `text` is a log of XFLR5.
 pub(super) fn is_here(text: &str) -> bool {
     text.contains("Longitudinal derivatives") && text.contains("CLa=")
 }
@@ -21,7 +21,7 @@ pub(super) fn read(text: &str) -> Result<Derivatives, DerivativesError> {
     let need = |name: &str| numbers.need(name, FROM);
     let alpha = need("Alpha")?.to_radians();
     let reference = numbers.reference(FROM)?;
-    // the log has only the derivatives that a symmetric aircraft has, and the others are zero
+    // the log omits the derivatives that are zero for a symmetric aircraft
     let stability = |values: [Option<f64>; 5]| -> Column {
         to_body(values.map(Option::unwrap_or_default), alpha)
     };
@@ -56,7 +56,8 @@ pub(super) fn read(text: &str) -> Result<Derivatives, DerivativesError> {
     })
 }
 
-/// The control of the analysis, identified by its largest moment. `None` if the log has no control derivatives.
+/// The control whose derivatives the log has. The log does not name it: it is taken for the aileron, the elevator or the rudder,
+/// depending on whether its rolling, pitching or yawing moment is largest. `None` if the log has no control derivatives.
 fn control(numbers: &Numbers, alpha: f64, notes: &mut Vec<String>) -> Option<Control> {
     let get = |name: &str| numbers.get(name).unwrap_or(0.0);
     let moments = [get("CLde"), get("CMde"), get("CNde")];

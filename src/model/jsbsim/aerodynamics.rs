@@ -1,4 +1,4 @@
-//! Aerodynamics of an exported aircraft, one function per axis.
+//! The aerodynamics section of an exported JSBSim aircraft. Each axis has one function.
 
 use std::fmt::Write;
 
@@ -7,14 +7,15 @@ use super::{AILERON, ALPHA, BETA, ELEVATOR, RUDDER, coefficient, engine, product
 use crate::GreyBox;
 use greylag_num::Table;
 
-/// A coefficient: its name, its axis, and its factors in addition to q S (and b or c for a moment).
+/// A coefficient: its name, its axis, and the properties by which it is multiplied. The factor q S, and b or c for a moment,
+/// is common to the axis and not listed.
 type Factor = (&'static str, &'static str, &'static [&'static str]);
 
 const P: [&str; 2] = ["aero/bi2vel", "velocities/p-aero-rad_sec"];
 const Q: [&str; 2] = ["aero/ci2vel", "velocities/q-aero-rad_sec"];
 const R: [&str; 2] = ["aero/bi2vel", "velocities/r-aero-rad_sec"];
 
-/// Coefficients that JSBSim expresses as products of properties.
+/// The coefficients whose terms are exported as products of JSBSim properties.
 const FACTORS: &[Factor] = &[
     ("lift_linear.CL0", "LIFT", &[]),
     ("lift_linear.CLalpha", "LIFT", &[ALPHA]),
@@ -52,7 +53,7 @@ const FACTORS: &[Factor] = &[
     ("rudder_linear.Cndr", "YAW", &[RUDDER]),
 ];
 
-/// Tables over the angle of attack, each as effect and axis.
+/// Effects that are exported as tables over the angle of attack, each with its axis.
 const TABLES: &[(&str, &str)] =
     &[("lift_table", "LIFT"), ("drag_table", "DRAG"), ("pitch_table", "PITCH")];
 
@@ -62,7 +63,7 @@ pub(super) fn knows(name: &str) -> bool {
         || TABLES.iter().any(|(table, _)| name.strip_suffix(".k") == Some(table))
 }
 
-/// The aerodynamics section for all conditions.
+/// The text of the section for all conditions, such as flap settings.
 pub(super) fn section(conditions: &Conditions) -> String {
     let mut out = "  <aerodynamics>\n".to_owned();
     for (axis, length) in [
@@ -93,7 +94,7 @@ pub(super) fn section(conditions: &Conditions) -> String {
     out
 }
 
-/// The terms of one axis of `model` as elements of a sum.
+/// The terms of `model` on one axis, as XML elements of a sum.
 fn terms(model: &GreyBox, axis: &str) -> String {
     let products = FACTORS
         .iter()

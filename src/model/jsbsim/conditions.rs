@@ -1,4 +1,5 @@
-//! Export of the models of several conditions as one aircraft that interpolates between the conditions.
+//! Exports several models of an aircraft as one aircraft of JSBSim. Each model is valid in one condition, for example at one
+//! flap setting. The exported aircraft interpolates between the conditions.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -53,12 +54,12 @@ pub enum ConditionsError {
         first: String,
         /// Name of the second model.
         second: String,
-        /// The differing quantity, in words.
+        /// Description of the differing quantity.
         what: String,
     },
 }
 
-/// Models of one aircraft, one per setting of a property.
+/// Models of one aircraft, one for each setting of a property of JSBSim.
 pub(super) struct Conditions<'a> {
     /// Name of the property. Empty for a single model.
     property: String,
@@ -126,7 +127,8 @@ impl<'a> Conditions<'a> {
         }
     }
 
-    /// Channel with the weights of the conditions. Each weight is one at its own setting and zero at the others.
+    /// Text of a JSBSim channel that computes the weight of each condition. A weight is one at the setting of its condition and
+    /// zero at the other settings. Between two settings it is interpolated linearly.
     pub(super) fn weights(&self) -> String {
         if self.settings.len() == 1 {
             return String::new();
@@ -152,7 +154,7 @@ impl<'a> Conditions<'a> {
         out
     }
 
-    /// Weighted sum over all conditions. `terms` gives the terms of one model.
+    /// Text of the weighted sum over all conditions. `terms` returns the text of the terms of one model.
     pub(super) fn weighted(&self, terms: impl Fn(&GreyBox) -> String) -> String {
         if let [(_, model)] = &self.settings[..] {
             return terms(model);

@@ -1,4 +1,4 @@
-//! Flight-control section of an exported aircraft whose surfaces are commanded individually.
+//! Flight-control section of an aircraft file exported for JSBSim, if each surface has its own command.
 
 use std::fmt::Write;
 
@@ -7,7 +7,8 @@ use greylag_physics::airframe::ActuatorFigures;
 use greylag_physics::mixer::{CONTROLS, Does, Effector, Mixer};
 use greylag_physics::servos::{Surface, Travel};
 
-/// Surfaces of `mixer` with their travel, command property and position property. `None` if a surface lacks a property.
+/// The surfaces of `mixer` with their travel, command property and position property. `None` if a surface lacks one of the
+/// properties.
 fn named(mixer: &Mixer) -> Option<Vec<(&Effector, Travel, &str, &str)>> {
     let surfaces = mixer.effectors().iter().filter_map(|e| match e.does {
         Does::Deflects(travel) => Some((e, travel)),
@@ -18,7 +19,8 @@ fn named(mixer: &Mixer) -> Option<Vec<(&Effector, Travel, &str, &str)>> {
         .collect()
 }
 
-/// One channel per surface, then a channel with the deflections of the controls. `None` if a surface lacks a property.
+/// Writes one JSBSim channel per surface, then a channel that computes the aileron, elevator and rudder deflections from the
+/// surfaces. `None` if a surface lacks a property.
 pub(super) fn channels(mixer: &Mixer, figures: &ActuatorFigures) -> Option<String> {
     let surfaces = named(mixer)?;
     let mut out = String::new();
@@ -63,7 +65,7 @@ pub(super) fn channels(mixer: &Mixer, figures: &ActuatorFigures) -> Option<Strin
     Some(out)
 }
 
-/// The actuator filter of the control that moves the surface with the largest gain.
+/// The actuator dynamics of the control (aileron, elevator or rudder) that moves the surface with the largest gain.
 fn like(effector: &Effector, figures: &ActuatorFigures) -> Surface {
     let [aileron, elevator, rudder, _] = effector.gains.map(f64::abs);
     match figures.rudder {

@@ -1,11 +1,12 @@
-//! The engine of an exported aircraft: thrust as an external force, with its lag, lever arm and torque.
+//! The engine of an aircraft that is exported to JSBSim: thrust as an external force, with its lag, its lever arm and the
+//! engine's torque.
 
 use super::{FT, LBF, THROTTLE, coefficient, product};
 use crate::GreyBox;
 use greylag_num::Grid;
 
 const SPEED: &str = "velocities/vt-fps";
-/// Property of the throttle that acts on the engine if the thrust has a lag.
+/// JSBSim property with the lagged throttle, which drives the engine if the thrust has a lag.
 const LATE_THROTTLE: &str = "fcs/engine-throttle-norm";
 const LAG: &str = "thrust_lag.tau_s";
 const DENSITY: &str = "fcs/density-ratio";
@@ -14,7 +15,8 @@ const TABLE: &str = "thrust_table.k";
 const ARM: &str = "thrust_line_offset.z_m";
 const TORQUE: &str = "motor_torque.k_nm";
 
-/// Thrust terms, each as coefficient and factors. JSBSim's airspeed is in ft/s.
+/// Terms of the thrust: name of the model's coefficient, and the JSBSim properties by which it is multiplied. JSBSim's airspeed
+/// is in ft/s.
 const THRUST: &[(&str, &[&str])] = &[
     ("thrust_linear.Cp_n", &[THROTTLE]),
     ("propeller.T0_n", &[DENSITY]),
@@ -25,17 +27,18 @@ const THRUST: &[(&str, &[&str])] = &[
     ("propeller.TVV_ns2pm2", &[DENSITY, SPEED, SPEED]),
 ];
 
-/// Whether the exported engine contains the coefficient `name`.
+/// Whether the exported engine uses the model's coefficient `name`.
 pub(super) fn knows(name: &str) -> bool {
     THRUST.iter().any(|(term, _)| *term == name) || [TABLE, LAG, ARM, TORQUE].contains(&name)
 }
 
-/// Property of the throttle that acts on the engine of `model`.
+/// JSBSim property with the throttle that drives the engine of `model`.
 fn throttle(model: &GreyBox) -> &'static str {
     if coefficient(model, LAG) > 0.0 { LATE_THROTTLE } else { THROTTLE }
 }
 
-/// XML of the thrust's lag filter, whose input is the filtered throttle. Empty if the thrust has no lag.
+/// XML of the lag filter from the actuator's throttle position to the throttle that drives the engine. Empty if the thrust has
+/// no lag.
 pub(super) fn lag(model: &GreyBox) -> String {
     let lag = coefficient(model, LAG);
     if lag <= 0.0 {
@@ -48,7 +51,7 @@ pub(super) fn lag(model: &GreyBox) -> String {
     )
 }
 
-/// Section of external reactions, with the thrust along body x.
+/// XML section of external reactions, with the thrust along body x.
 pub(super) fn force(model: &GreyBox) -> String {
     let throttle = throttle(model);
     let terms: String = THRUST
@@ -73,7 +76,7 @@ pub(super) fn force(model: &GreyBox) -> String {
     )
 }
 
-/// Thrust table times `factor`, in lbf, over throttle and airspeed in ft/s.
+/// XML of the thrust table times `factor`, in lbf, over throttle (rows) and airspeed in ft/s (columns).
 fn tabulated(grid: &Grid, factor: f64, throttle: &str) -> String {
     let [throttles, airspeeds] = grid.axes();
     let heads: String = airspeeds.iter().map(|v| format!(" {:?}", v / FT)).collect();
@@ -90,7 +93,7 @@ fn tabulated(grid: &Grid, factor: f64, throttle: &str) -> String {
     )
 }
 
-/// Rolling-moment function of the engine's torque. A positive torque rolls the aircraft to the left.
+/// XML of the rolling moment of the engine's torque. A positive torque rolls the aircraft to the left.
 pub(super) fn torque(model: &GreyBox) -> String {
     let torque = coefficient(model, TORQUE);
     if torque == 0.0 {

@@ -1,4 +1,4 @@
-//! Dimensionless flight characteristics, which are comparable between aircraft of all sizes.
+//! Dimensionless flight characteristics (traits), by which aircraft of different sizes can be compared.
 
 use nalgebra::Matrix2;
 
@@ -9,9 +9,9 @@ use greylag_physics::atmosphere::STANDARD_GRAVITY;
 /// A dimensionless characteristic of an aircraft. Times are in units of V/g at the cruise airspeed V (Froude scaling).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Trait {
-    /// Name in tables.
+    /// Name of the trait in tables.
     pub name: &'static str,
-    /// Definition in words.
+    /// Definition of the trait in words.
     pub meaning: &'static str,
 }
 
@@ -44,11 +44,11 @@ pub struct Character {
     pub values: [f64; TRAITS.len()],
 }
 
-/// Straight flight at the cruise airspeed, with its linear model.
+/// Trimmed straight flight at the cruise airspeed, with its linear model.
 pub(super) struct Cruise {
     pub trim: Trim,
     pub rates: Rates,
-    /// Rate of the airspeed at full throttle from this trim, m/s².
+    /// Rate of change of the airspeed at full throttle in the trimmed state, m/s².
     pub excess: f64,
     /// The ratio V/g, s.
     pub time: f64,
@@ -66,8 +66,8 @@ impl Cruise {
         Ok(Cruise { trim, rates: rates(model, &trim, altitude), excess, time })
     }
 
-    /// The short period, approximated by the eigenvalues of the system of q and α alone: the largest growth rate (1/s, negative
-    /// for decay) and the largest natural frequency (rad/s).
+    /// The short-period mode, approximated by the eigenvalues of the system of q and α alone. Returns the largest growth rate
+    /// (1/s, negative for decay) and the largest natural frequency (rad/s).
     pub(super) fn short_period(&self) -> [f64; 2] {
         let a = &self.rates.a;
         let short = Matrix2::new(a[(4, 4)], a[(4, 6)], a[(6, 4)], a[(6, 6)]);
@@ -76,7 +76,7 @@ impl Cruise {
         [most(&|k| modes[k].re), most(&|k| modes[k].norm())]
     }
 
-    /// Decay rate of the roll rate, 1/s.
+    /// Roll damping −L_p: decay rate of the roll rate, 1/s.
     pub(super) fn roll_damping(&self) -> f64 {
         -self.rates.a[(3, 3)]
     }
@@ -93,10 +93,10 @@ impl Character {
         let speed = model.airframe.envelope.airspeed_cruise_mps;
         let figures = &model.airframe.actuators;
         let weight = body.mass * STANDARD_GRAVITY;
-        // pitching moment slope divided by lift slope and chord, where the lift slope includes thrust and drag
+        // slope of the pitching moment divided by lift slope and chord. This lift slope includes thrust and drag
         let margin = a[(4, 6)] * body.jy / (a[(6, 6)] * body.mass * speed * geometry.chord);
         let [b0, a1, a2] = figures.aileron.filter;
-        // by the inverse of the bilinear transform, 4 b0 / (1 - a1 + a2) is (w step / 2)^2
+        // the inverse of the bilinear transform gives (w step / 2)^2 = 4 b0 / (1 - a1 + a2), with the natural frequency w
         let servo = 2.0 * (4.0 * b0 / (1.0 - a1 + a2)).sqrt() / figures.step;
         let square = time * time;
         Ok(Character {

@@ -1,4 +1,5 @@
-//! Random draws of aircraft from a distribution: mass and dimensions within ranges, coefficients about textbook values.
+//! Random draws of aircraft from a distribution (a file such as `params/any/aircraft.toml`). Mass and dimensions are drawn from
+//! ranges. Coefficients are textbook estimates times random factors.
 
 use rand_distr::{Distribution, StandardNormal, Uniform};
 
@@ -9,15 +10,16 @@ use crate::textbook::{Drives, Estimate, Measures, Section, Tail};
 use greylag_num::stream::{Stream, stream};
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
-/// Number of the random stream for aircraft.
+/// Number that separates the random stream of these draws from others with the same seed.
 const AIRCRAFT: u64 = 49;
 /// Largest number of attempts at one aircraft, after which the draw fails.
 const TRIES: u64 = 200;
-/// Truncation of log-normal factors, in standard deviations.
+/// The logarithms of log-normal factors are limited to this many standard deviations.
 const CUT: f64 = 2.5;
-/// Lift coefficient of the textbook's cruise: the largest lift coefficient divided by 1.6².
+/// Lift coefficient at the cruise airspeed, which the textbook estimates take as 1.6 times the stall airspeed: the largest lift
+/// coefficient, 1.2, divided by 1.6².
 const CRUISE_LIFT: f64 = 0.47;
-/// Ratio of the rolling moment of a V-tail's rudder to that of a rudder on a fin.
+/// Ratio of the rolling moment due to the rudder command of a V-tail to that of a rudder on a fin.
 const V_TAIL_ROLL: f64 = 4.0;
 const SOURCE: &str = "drawn";
 
@@ -26,7 +28,7 @@ const SOURCE: &str = "drawn";
 pub enum Layout {
     /// A tailplane and a fin with a rudder.
     Conventional,
-    /// A V-tail with two surfaces that act as elevator and rudder.
+    /// A V-tail, whose two surfaces act as elevator and rudder.
     VTail,
     /// A tailplane and a fin without a rudder.
     WithoutRudder,
@@ -55,15 +57,15 @@ pub struct Drawn {
     pub layout: Layout,
     /// Static margin as a fraction of the chord.
     pub static_margin: f64,
-    /// Delay between a command and the surface's response in addition to the servo's lag, s.
+    /// Time delay of the surfaces in addition to the servos' lag, s.
     pub delay_s: f64,
     /// Mass, dimensions and propulsion of the aircraft, as a user could state them.
     pub measures: Measures,
-    /// The exact model of the aircraft.
+    /// The model of the aircraft as drawn.
     pub exact: GreyBox,
-    /// The textbook model that is estimated from the measures.
+    /// The model that textbook methods estimate from `measures`.
     pub textbook: GreyBox,
-    /// Texts of the exact model's airframe file and model file, in this order.
+    /// Texts of the airframe file and the model file of `exact`, in this order.
     pub files: [String; 2],
 }
 
@@ -73,7 +75,7 @@ pub enum DrawError {
     /// The drawn values do not form a valid model.
     #[error("a drawn aircraft is no model: {0}; correct the distribution")]
     Model(String),
-    /// No drawn aircraft meets the conditions of `[flyable]`.
+    /// No drawn aircraft meets the conditions in the section `[flyable]` of the distribution's file.
     #[error(
         "of {} aircraft drawn none meets [flyable]; widen the distribution or its conditions",
         TRIES
@@ -82,7 +84,7 @@ pub enum DrawError {
 }
 
 fn uniform(rng: &mut Stream, [least, most]: Range) -> f64 {
-    // this does not fail: the reader of the distribution has checked that the ends are finite and in order
+    // no error is possible here: the reader of the file has checked that the ends are finite and in order
     Uniform::new_inclusive(least, most).map_or(least, |between| between.sample(rng))
 }
 
@@ -96,7 +98,7 @@ fn log_normal(rng: &mut Stream, width: f64) -> f64 {
 }
 
 impl Population {
-    /// Draws aircraft `number` of `seed`. The result does not depend on other draws.
+    /// Draws the aircraft with index `number` of `seed`. The result does not depend on other draws.
     ///
     /// # Errors
     /// If no drawn aircraft is a valid model that meets the conditions of `[flyable]`.
@@ -107,7 +109,7 @@ impl Population {
             match self.one(&mut rng, seed, number) {
                 Ok(drawn) if self.flies(&drawn.exact) => return Ok(drawn),
                 Ok(_) => {}
-                // for example, a coefficient is outside the catalogue's physical bounds
+                // for example, a coefficient lies outside the physical bounds of its effect
                 Err(error) => why = error,
             }
         }
@@ -194,7 +196,7 @@ impl Population {
         Ok(Drawn { number, layout, static_margin, delay_s, measures, exact, textbook, files })
     }
 
-    /// The textbook's coefficients times positive random factors.
+    /// The textbook estimates of the coefficients, each multiplied by a positive random factor.
     fn sections(&self, rng: &mut Stream, measures: &Measures) -> Vec<Section> {
         let mut sections = measures.sections();
         for (_, value, width, source) in sections.iter_mut().flat_map(|(_, all)| all.iter_mut()) {
@@ -204,8 +206,8 @@ impl Population {
         sections
     }
 
-    /// Sets the coefficients that determine the balance of moments: static margin, elevator at cruise, and asymmetry in roll
-    /// and yaw.
+    /// Sets the coefficients that determine the trim: Cmα for the static margin `margin`, Cm0 for a random elevator deflection in
+    /// cruise, and random Cl0 and Cn0 for the asymmetry in roll and yaw.
     fn balanced(
         &self,
         rng: &mut Stream,
@@ -224,7 +226,7 @@ impl Population {
         change(sections, "yaw_linear", "Cn0", |_| crooked[1]);
     }
 
-    /// Moments of inertia, kg m². Jz is less than Jx + Jy, as for every rigid body.
+    /// Random moments of inertia and product of inertia, kg m². Jz is less than Jx + Jy, as for every rigid body.
     fn inertia(&self, rng: &mut Stream, measures: &Measures) -> [Estimate; 4] {
         let [(_, jx, ..), (_, jy, ..), (_, jz, ..), _] = measures.inertia();
         let width = self.shape.inertia_width;
@@ -240,8 +242,8 @@ impl Population {
     }
 }
 
-/// Extends the airframe's pitch limit from 10° to 20° nose down. The textbook's limit is for a first flight; drawn aircraft
-/// are used in tests.
+/// Changes the smallest pitch angle in the text of an airframe file from −10° to −20°. The limit of −10° is meant for a first
+/// flight. Drawn aircraft fly in simulations only.
 fn deeper(airframe: &str) -> String {
     airframe.replace("pitch_min_deg = -10.0", "pitch_min_deg = -20.0")
 }
@@ -290,12 +292,12 @@ mod tests {
         let drawn: Vec<Drawn> = (0..60).map(|k| population.draw(1, k).unwrap()).collect();
         for d in &drawn {
             let body = &d.exact.body;
-            // numbers in the file have five decimals
+            // the tolerance covers the rounding to five decimals in the file
             assert!(body.jz <= body.jx + body.jy + 2e-5 && body.is_physical(), "{body:?}");
             assert!((-0.05..=0.3).contains(&d.static_margin));
             assert!(population.flies(&d.exact));
             assert_eq!(d.exact.has_rudder(), d.measures.rudder.is_some());
-            // the coefficient corresponds to the static margin, to the five decimals of the file
+            // Cmα gives the static margin, up to the rounding to five decimals in the file
             let of =
                 |name: &str| d.exact.coefficients().iter().find(|c| c.name == name).unwrap().value;
             let margin = -of("pitch_linear.Cmalpha") / of("lift_linear.CLalpha");

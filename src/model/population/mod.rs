@@ -16,7 +16,7 @@ pub use draw::{DrawError, Drawn, Layout};
 /// Smallest and largest value of a quantity.
 type Range = [f64; 2];
 
-/// A distribution of aircraft, read from `params/any/aircraft.toml`. Comments in this file explain each number.
+/// A distribution of aircraft, read from a file such as `params/any/aircraft.toml`. The comments there explain each number.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Population {

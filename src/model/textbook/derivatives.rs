@@ -1,4 +1,5 @@
-//! Coefficients of each effect from textbook formulas.
+//! Aerodynamic and thrust coefficients from textbook formulas. Each [`Estimate`] is a name, a value, a relative standard
+//! deviation and a source.
 
 use super::{Estimate, Figures, Measures, Tail, helmbold};
 
@@ -10,7 +11,7 @@ const FIN: [f64; 4] = [0.04, 0.4, 3.0, 0.55];
 const EFFICIENCY: f64 = 0.85;
 
 impl Measures {
-    /// Selects the text of a source according to the aircraft's tail.
+    /// Returns `conventional` or `flying_wing`, depending on the tail of the aircraft.
     fn source(&self, conventional: &'static str, flying_wing: &'static str) -> &'static str {
         match self.tail {
             Tail::Conventional => conventional,
@@ -138,8 +139,8 @@ impl Measures {
         ]
     }
 
-    /// Thrust T = Ts (δ² − δ V/Vp) of a fixed-pitch propeller with static thrust Ts (N) and pitch speed Vp (m/s). The voltage
-    /// is proportional to the throttle δ.
+    /// Thrust T = Ts (δ² − δ V/Vp) of a fixed-pitch propeller with static thrust Ts (N) and pitch speed Vp (m/s). The motor's
+    /// voltage is assumed to be proportional to the throttle δ.
     pub(super) fn thrust(&self) -> Vec<Estimate> {
         let (rest, source) = (self.static_thrust, "static thrust and pitch speed");
         vec![

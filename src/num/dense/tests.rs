@@ -1,9 +1,10 @@
-//! Tests of network outputs against their definition with every scalar type, and of derivatives against central differences.
+//! Tests of [`Dense`]. Outputs in several number types are compared with the definition of the network, and derivatives with
+//! central differences.
 
 use super::*;
 use crate::{Dual, Lanes, stream};
 
-/// A network whose layer sizes are not multiples of the block sizes.
+/// A network whose layer sizes are not multiples of the sizes of a SIMD block.
 fn network() -> Dense {
     let mut network = Dense::silent(&[3, 21, 9, 2], &mut stream::stream(5, &[])).unwrap();
     let mut rng = stream::stream(6, &[]);
@@ -12,7 +13,7 @@ fn network() -> Dense {
     network
 }
 
-/// The network's output computed by its definition.
+/// The output of `network` for `input`, computed in double precision from the definition.
 fn by_hand(network: &Dense, input: [f64; 3]) -> Vec<f64> {
     let mut x = input.to_vec();
     let last = network.sizes().len() - 2;
@@ -82,7 +83,7 @@ fn derivatives_agree_with_central_differences() {
         };
         let (up, down) = (moved(1e-6), moved(-1e-6));
         for o in 0..2 {
-            // the network is piecewise linear, and the difference quotient has only rounding errors
+            // the network is piecewise linear, so the difference quotient has rounding errors only
             assert!((dual[o].gradient[i] - (up[o] - down[o]) / 2e-6).abs() < 1e-8);
         }
     }

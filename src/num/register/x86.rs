@@ -1,4 +1,4 @@
-//! Registers of x86-64 processors: SSE2, AVX2 and AVX-512.
+//! The operations of [`Register`] with the vector instructions of x86-64 processors: SSE2, AVX2 and AVX-512.
 
 use std::arch::x86_64::*;
 
@@ -17,7 +17,7 @@ impl Register for __m128 {
     fn abs(self) -> Self {
         unsafe { _mm_andnot_ps(_mm_set1_ps(-0.0), self) }
     }
-    /// A library call for each lane, because SSE2 has no fused multiply-add.
+    /// Calls a library function for each lane, because SSE2 has no fused multiply-add.
     #[inline(always)]
     fn fused(self, factor: Self, addend: Self) -> Self {
         let (mut x, mut f, mut a) = ([0.0_f32; 4], [0.0; 4], [0.0; 4]);

@@ -1,11 +1,11 @@
-//! The controls of an airframe file and their actuator filters.
+//! The sections of an airframe file that describe surfaces and throttle, and the actuator filters that follow from them.
 
 use serde::Deserialize;
 
 use super::{Sourced, positive};
 use crate::servos::{ActuatorFigures, Surface, Travel};
 
-/// Time step of the filters, s: the control period.
+/// Time step of the discrete filters, s. It is the control period.
 const STEP: f64 = 0.01;
 /// Largest accepted deflection of a surface, rad.
 const TRAVEL: f64 = 1.6;
@@ -112,7 +112,8 @@ impl SurfaceFile {
     }
 }
 
-/// Travel (rad) that a file states, either symmetric (`both`) or with two limits (`min`, `max`). The error names `name`.
+/// The travel (rad) of a surface from the entries of a file: one symmetric limit (`both`), or two limits (`min`, `max`). Errors
+/// call the surface `name`.
 pub(super) fn travel(
     name: &str,
     [both, min, max]: [&Option<Sourced>; 3],

@@ -1,4 +1,5 @@
-//! Surfaces and motors that an airframe file names.
+//! The effectors (surfaces and motors) of an airframe file, and the mixer that drives them. A mixer computes the command of
+//! each effector from the commands of aileron, elevator, rudder and throttle.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +12,7 @@ use crate::servos::{Travel, Travels};
 
 /// Largest channel number of a flight controller's servo outputs.
 const CHANNELS: u8 = 32;
-/// Largest accepted |gain| of an effector.
+/// Largest accepted |gain| from one of the four commands to an effector.
 const GAIN: f64 = 2.0;
 
 /// Section `[surfaces.NAME]` of an airframe file.
@@ -44,10 +45,10 @@ pub(super) struct MotorFile {
     position: Option<String>,
 }
 
-/// The mixer described by the file. `None` if the file names neither surfaces nor motors.
+/// The mixer of an airframe file. `None` if the file names neither surfaces nor motors.
 ///
-/// If the file names only surfaces, one motor driven by the throttle is added. If the file names only motors, one surface
-/// is added for each axis that has a travel in `travels`.
+/// If the file names only surfaces, one motor driven by the throttle is added. If the file names only motors, an aileron,
+/// an elevator and, if `travels` has one, a rudder are added.
 pub(super) fn mixer(
     surfaces: &BTreeMap<String, SurfaceFile>,
     motors: &BTreeMap<String, MotorFile>,

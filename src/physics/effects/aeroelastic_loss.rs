@@ -4,10 +4,10 @@ use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coeffici
 use greylag_num::Real;
 use crate::{Channel, Point, State};
 
-/// Airspeed at which the effectiveness equals the model's, m/s: that of `State::NEUTRAL`.
+/// Airspeed at which the effect is zero, m/s: that of `State::NEUTRAL`.
 const V0: f64 = State::NEUTRAL.airspeed;
 
-/// Effectiveness of aileron and elevator that decreases with dynamic pressure.
+/// Effectiveness of the control surfaces that decreases with dynamic pressure.
 pub struct AeroelasticLoss;
 
 impl Effect for AeroelasticLoss {

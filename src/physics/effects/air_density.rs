@@ -1,10 +1,10 @@
-//! Air density that differs from the model's.
+//! Effect of an air density that differs from the model's.
 
 use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// The same relative change of every aerodynamic force and moment.
+/// Multiplies every aerodynamic force and moment by the same factor 1 + k.
 pub struct AirDensity;
 
 impl Effect for AirDensity {

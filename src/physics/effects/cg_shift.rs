@@ -1,11 +1,11 @@
-//! Centre of gravity that differs from the model's.
+//! An effect of the catalogue: the centre of gravity lies elsewhere than the model states.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Change of the moments if the centre of gravity lies aft of the model's, along body x. A negative distance means
-/// forward.
+/// Change of the moments if the centre of gravity lies aft of that in the model, along body x. A negative distance means that it
+/// lies forward.
 pub struct CgShift;
 
 impl Effect for CgShift {

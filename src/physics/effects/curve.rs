@@ -1,7 +1,8 @@
-//! Curves over the angle of attack as sums of hat functions, linear in their ordinates.
+//! Piecewise linear curves over the angle of attack, as sums of hat functions. The coefficients are the ordinates at the
+//! knots.
 //!
-//! Two knots of the grid are fixed at zero. Otherwise the curve could represent a straight line that the coefficients `CL0`
-//! and `CLalpha` (or `CD0`) of other effects already represent.
+//! Two knots are fixed at zero. Without this, the curve could represent a straight line, which the coefficients `CL0` and
+//! `CLalpha` (or `CD0`) of other effects already represent.
 
 use super::Terms;
 use crate::Channel;
@@ -11,7 +12,7 @@ use greylag_num::Real;
 const FIRST_DEG: f64 = -8.0;
 /// Distance between knots of the grid, degrees.
 const SPACING_DEG: f64 = 2.0;
-/// Range of angles of attack in which the knots are half as far apart, degrees. The stall is in this range.
+/// Range of angles of attack around the stall in which the knots are half as far apart, degrees.
 const FINE_DEG: (f64, f64) = (10.0, 20.0);
 /// Number of knots, from −8° to 30°.
 const PLACES: usize = 25;
@@ -38,10 +39,11 @@ macro_rules! heights {
 }
 pub(super) use heights;
 
-/// Adds to `terms` each hat function at `alpha` (rad) times `amount`. Beyond its first and last knot a curve is constant.
+/// Adds one term per coefficient to `terms`: the value of its hat function at `alpha` (rad), times `amount`. Beyond the first
+/// and the last knot a curve is constant.
 ///
-/// Other effects are always inlined. This function is inlined only for scalars in SIMD registers; elsewhere it would
-/// enlarge the code of every fit.
+/// The code of other effects is always inlined. This function is inlined only for SIMD vectors, because for other scalars it
+/// would enlarge the code of every fit.
 #[inline(always)]
 pub(super) fn hats<R: Real>(alpha: R, amount: R, channel: Channel, terms: &mut impl Terms<R>) {
     #[inline(never)]

@@ -14,7 +14,7 @@ impl Effect for DragBeta2 {
     const SOURCE: &'static str = "Gryte18; JSBSim's X8, see params/x8/FACTS.md";
     const COEFFICIENTS: &'static [Coefficient] = &[
         coefficient("CDbeta", "drag due to the magnitude of sideslip", "1/rad", (-0.5, 0.5)),
-        // may be negative in a model whose side force acts along body y instead of across the airflow: the side force then
+        // may be negative in a model whose side force acts along body y instead of across the airflow: such a side force already
         // adds |CYβ| β² to the drag
         coefficient("CDbeta2", "drag due to the square of sideslip", "1/rad²", (-0.5, 5.0)),
     ];

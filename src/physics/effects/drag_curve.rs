@@ -4,7 +4,7 @@ use super::{Coefficient, Effect, Own, Terms, curve};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Drag in addition to that of the other effects, as a curve over the angle of attack.
+/// Adds a drag coefficient to those of the other effects. It is a piecewise linear function of the angle of attack.
 pub struct DragCurve;
 
 impl Effect for DragCurve {

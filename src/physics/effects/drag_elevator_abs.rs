@@ -1,4 +1,4 @@
-//! Drag of a deflected elevator, the same for up and down.
+//! Drag of a deflected elevator, equal for upward and downward deflections.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;

@@ -1,10 +1,10 @@
-//! Drag that is linear in angle of attack, pitch rate and elevator.
+//! An effect of the catalogue: the linear part of the drag.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Drag linear in angle of attack, pitch rate and elevator.
+/// Drag that is linear in angle of attack, pitch rate and elevator deflection.
 pub struct DragLinear;
 
 impl Effect for DragLinear {

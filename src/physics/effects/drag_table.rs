@@ -4,7 +4,7 @@ use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Drag as a table over angle of attack.
+/// The effect `drag_table`: the drag coefficient is a factor times a table over the angle of attack.
 pub struct DragTable;
 
 impl Effect for DragTable {

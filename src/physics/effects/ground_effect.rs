@@ -6,9 +6,9 @@ use crate::{Channel, Point};
 
 /// Lift slope that increases and induced drag that decreases towards the ground.
 ///
-/// A model knows the altitude above sea level but not the terrain. The ground's altitude `ground_m` is therefore a constant
-/// of the effect, and the effect is valid over flat ground such as an airfield. `ground_m` must be given, because logs
-/// contain no height above ground. The effect vanishes a few spans above the ground.
+/// A model gets the altitude above sea level but not the height of the terrain. The ground's altitude `ground_m` is therefore a
+/// constant of the effect, and the effect is valid only over flat ground such as an airfield. `ground_m` must be given, because
+/// logs contain no height above ground. A few spans above the ground, the effect is negligible.
 pub struct GroundEffect;
 
 impl Effect for GroundEffect {

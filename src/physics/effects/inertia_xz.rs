@@ -1,11 +1,11 @@
-//! Product of inertia that differs from the model's.
+//! Effect of a product of inertia Jxz that differs from the model's.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::rigid_body::RigidBody;
 use crate::{Channel, Point};
 
-/// Addition to the product of inertia Jxz, kg m².
+/// Adds the coefficient `dJxz_kgm2` to the model's product of inertia Jxz.
 pub struct InertiaXz;
 
 impl Effect for InertiaXz {

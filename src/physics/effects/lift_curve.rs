@@ -14,7 +14,8 @@ impl Effect for LiftCurve {
     const FORMULA: &'static str = "L = Q Σ CLk hk(α), hk falling from 1 at αk to 0 at the knots beside it";
     const SOURCE: &'static str = "piecewise linear, knots every 2°, from 10° to 20° every 1°, zero at 0° and 4°";
     const COEFFICIENTS: &'static [Coefficient] = curve::heights!("CL", (-0.5, 0.5));
-    /// Evaluated after the effects that need only the point. Otherwise `lift_stall` would remove the curve beyond the stall.
+    /// The effect is evaluated after those that depend only on state and controls. Otherwise `lift_stall` would remove its lift
+    /// beyond the stall.
     const NEEDS: Needs = Needs::Base;
 
     #[inline(always)]

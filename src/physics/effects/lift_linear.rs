@@ -1,10 +1,10 @@
-//! Lift that is linear in angle of attack, pitch rate and elevator.
+//! An effect of the catalogue: the linear part of the lift.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Lift linear in angle of attack, pitch rate and elevator.
+/// Lift that is linear in angle of attack, pitch rate and elevator deflection.
 pub struct LiftLinear;
 
 impl Effect for LiftLinear {

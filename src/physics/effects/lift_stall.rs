@@ -1,13 +1,13 @@
-//! Stall: a transition of the lift from the linear law to that of a flat plate.
+//! Stall: a transition of the lift from that of the other effects to that of a flat plate.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Loss of lift beyond the stall, with the transition of \[BM12\] section 4.2.
+/// Loss of lift beyond the stall, with the transition of R. W. Beard, T. W. McLain, "Small Unmanned Aircraft", section 4.2.
 pub struct LiftStall;
 
-/// Computes e^(x · sharpness), with the exponent limited to ±40. A closure in its place would prevent vectorisation.
+/// Computes e^(x · sharpness), with the exponent limited to ±40. It is a function because a closure prevents vectorisation.
 #[inline(always)]
 fn power<R: Real>(x: R, sharpness: f64) -> R {
     x.scale(sharpness).clamp(-40.0, 40.0).exp()

@@ -1,8 +1,9 @@
-//! Physical effects. Each effect is a group of forces or moments and has its own file.
+//! Physical effects. An effect is a group of forces and moments with their coefficients. Each effect has its own file.
 //!
 //! A new effect needs a file in this folder and its name in the list at the end of this file. Its id is then available in
-//! models, trim, linearisation, the planner, the parameter files, the search for missing effects and the report. Effects
-//! between actuator positions and acting deflections are in [`inputs`](crate::inputs).
+//! models, trim, linearisation, the planner, the parameter files, the search for missing effects and the report. Effects can
+//! also be defined by formulas in effect files (TOML). Effects between actuator positions and acting deflections are in
+//! [`inputs`](crate::inputs).
 
 use crate::formula::{Written, register};
 use crate::rigid_body::RigidBody;
@@ -45,17 +46,18 @@ impl Coefficient {
 const AERODYNAMIC: [Channel; 6] =
     [Channel::Drag, Channel::Lift, Channel::Side, Channel::Roll, Channel::Pitch, Channel::Yaw];
 
-/// Inputs of an effect in addition to the point of evaluation.
+/// Quantities from which an effect is computed. Each variant includes those before it.
 ///
-/// Effects that need more than the point are evaluated after the others. They receive the summed forces and moments of the
-/// others.
+/// The effects that need only the point of evaluation are evaluated first. The other effects then receive their summed forces
+/// and moments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Needs {
     /// Only the state, the controls and the airflow.
     Point,
     /// Also [`Point::base`]: the forces and moments of the effects that need only the point.
     Base,
-    /// Also [`Base::deflected`](crate::point::Base::deflected) and [`Base::still`](crate::point::Base::still).
+    /// Also the part of them that is due to the surfaces, [`Base::deflected`](crate::point::Base::deflected), and their value
+    /// for neutral surfaces and zero rates, [`Base::still`](crate::point::Base::still).
     Parts,
     /// Also the time derivative of the state, [`Base::rate`](crate::point::Base::rate).
     Rate,
@@ -80,8 +82,8 @@ pub struct Entry {
     /// Channels in which the effect acts. Empty for an input effect, which acts in the channels of the deflections. A changed
     /// mass or inertia acts like a force or moment in these channels.
     pub channels: &'static [Channel],
-    /// Quantities with which the effect may be confounded: ids of effects, full names (`effect.coefficient`) of a model's
-    /// coefficients, or a sensor error in words.
+    /// Quantities with which the effect may be confounded: ids of effects, full names (`effect.coefficient`) of coefficients, or
+    /// a text that names a sensor error.
     pub look_alikes: &'static [&'static str],
     /// Manoeuvre that distinguishes the effect from its `look_alikes`, in words.
     pub separated_by: &'static str,
@@ -93,9 +95,10 @@ pub struct Entry {
     pub starts: &'static [&'static [f64]],
 }
 
-/// Receiver of the terms that an effect reports.
+/// Receiver of the terms of an effect.
 ///
-/// It is a trait because its method can always be inlined. The call of a closure would leave a planner's vectorised code.
+/// It is a trait and not a closure, because its method can always be inlined. The call of a closure that is not inlined would
+/// not use the instruction set of a planner's vectorised code.
 pub trait Terms<R> {
     /// Receives the contribution of one unit of the effect's coefficient `index` to `channel`, in N or N m per unit.
     fn add(&mut self, index: usize, channel: Channel, amount: R);
@@ -129,14 +132,14 @@ pub trait Effect {
     /// Adds to `terms` the contribution of one unit of each coefficient to each channel at the point `at`.
     fn basis<R: Real>(at: &Point<R>, own: Own, terms: &mut impl Terms<R>);
 
-    /// Applies the effect's coefficients to the rigid body.
+    /// Changes mass and inertia of `_body` according to the effect's coefficients. Most effects change nothing.
     fn change(_coefficients: &[f64], _body: &mut RigidBody) {}
 }
 
 /// Description of an effect with its coefficients.
 #[derive(Clone, Copy, Debug)]
 pub struct Description {
-    /// Identifier, [`Effect::ID`].
+    /// Identifier of the effect, [`Effect::ID`].
     pub id: &'static str,
     /// Description in one sentence, [`Effect::DESCRIPTION`].
     pub description: &'static str,
@@ -170,7 +173,7 @@ macro_rules! effects {
             #[doc = concat!("See [`", stringify!($type), "`].")]
             $type,
         )*
-            /// An effect of an effect file.
+            /// An effect that an effect file defines.
             Written(&'static Written),
         }
 
@@ -204,8 +207,9 @@ macro_rules! effects {
                 }
             }
 
-            /// [`Effect::basis`] of this effect if it needs only the point. Otherwise it adds nothing. A sum over these
-            /// effects then contains no code of the dependent ones, which halves the computation time of a planner.
+            /// [`Effect::basis`] of this effect if the effect needs only the point; otherwise nothing is added. The code of a
+            /// sum over these effects therefore does not contain the other effects, which halves the computation time of a
+            /// planner.
             #[inline(always)]
             pub fn independent_basis<R: Real>(
                 self,
@@ -221,7 +225,7 @@ macro_rules! effects {
                 }
             }
 
-            /// [`Effect::basis`] of this effect if it needs more than the point. Otherwise it adds nothing.
+            /// [`Effect::basis`] of this effect if the effect needs more than the point; otherwise nothing is added.
             #[inline(always)]
             pub fn dependent_basis<R: Real>(
                 self,
@@ -255,13 +259,13 @@ impl PartialEq for Kind {
 }
 
 impl Kind {
-    /// The effect `id` of the catalogue, or of an effect file that was read. `None` if there is no such effect.
+    /// The effect `id` of the list in this file or of an effect file that was read. `None` if there is no such effect.
     pub fn from_id(id: &str) -> Option<Kind> {
         let known = Kind::ALL.iter().copied().find(|kind| kind.describe().id == id);
         known.or_else(|| register::find(id).map(Kind::Written))
     }
 
-    /// The effect of an effect file. `None` if this is an effect of the list.
+    /// The definition from the effect file. `None` if this is an effect of the list.
     pub fn written(self) -> Option<&'static Written> {
         match self {
             Kind::Written(effect) => Some(effect),

@@ -4,7 +4,7 @@ use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Rolling moment opposite to the propeller's rotation, proportional to throttle.
+/// Adds a rolling moment that is proportional to the throttle. A positive coefficient rolls to the left.
 pub struct MotorTorque;
 
 impl Effect for MotorTorque {

@@ -1,10 +1,10 @@
-//! Pitching moment that is linear in angle of attack, pitch rate and elevator.
+//! An effect of the catalogue: the linear part of the pitching moment.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Pitching moment linear in angle of attack, pitch rate and elevator.
+/// Pitching moment that is linear in angle of attack, pitch rate and elevator deflection.
 pub struct PitchLinear;
 
 impl Effect for PitchLinear {

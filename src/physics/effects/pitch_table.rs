@@ -4,7 +4,8 @@ use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Pitching moment as a table over angle of attack.
+/// The effect `pitch_table`: the moment coefficient is a factor times a table over the angle of attack. It adds to that of
+/// `pitch_linear`.
 pub struct PitchTable;
 
 impl Effect for PitchTable {

@@ -4,10 +4,10 @@ use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coeffici
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Throttle at which the effectiveness equals the model's, 0..1: that of the X8 in level flight at 16.67 m/s.
+/// Throttle at which the effect is zero, 0..1: that of the X8 in level flight at 16.67 m/s.
 const THROTTLE0: f64 = 0.118;
 
-/// Effectiveness of aileron and elevator that grows with throttle.
+/// Effectiveness of the control surfaces that grows with throttle.
 pub struct Propwash;
 
 impl Effect for Propwash {

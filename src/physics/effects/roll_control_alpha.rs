@@ -4,7 +4,7 @@ use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Rolling and yawing moments of the aileron that are proportional to the angle of attack.
+/// Adds rolling and yawing moments that are proportional to the product of angle of attack and aileron deflection.
 pub struct RollControlAlpha;
 
 impl Effect for RollControlAlpha {

@@ -1,10 +1,10 @@
-//! Side force, rolling moment and yawing moment that are linear in the rudder.
+//! An effect of the catalogue: forces and moments of the rudder.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Side force, rolling moment and yawing moment linear in the rudder deflection.
+/// Side force, rolling moment and yawing moment that are linear in the rudder deflection.
 pub struct RudderLinear;
 
 impl Effect for RudderLinear {

@@ -4,7 +4,7 @@ use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Side force linear in sideslip, roll rate, yaw rate and aileron.
+/// The effect `side_force_linear`, with the coefficients CY0, CYβ, CYp, CYr and CYδa.
 pub struct SideForceLinear;
 
 impl Effect for SideForceLinear {

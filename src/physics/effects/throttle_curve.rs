@@ -4,8 +4,8 @@ use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Thrust quadratic in throttle, as for a motor whose voltage is proportional to the throttle. The added thrust is zero
-/// at idle and at full throttle.
+/// Makes the thrust quadratic in throttle, as for a motor whose voltage is proportional to the throttle. The added thrust
+/// is zero without throttle and at full throttle.
 pub struct ThrottleCurve;
 
 impl Effect for ThrottleCurve {

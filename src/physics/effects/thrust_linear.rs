@@ -4,7 +4,7 @@ use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Thrust along body x, proportional to throttle.
+/// Adds a force along body x that is proportional to the throttle.
 pub struct ThrustLinear;
 
 impl Effect for ThrustLinear {

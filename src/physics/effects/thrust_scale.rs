@@ -1,4 +1,4 @@
-//! Thrust that differs from the model's.
+//! Thrust that differs from the model's by an amount proportional to the throttle.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;

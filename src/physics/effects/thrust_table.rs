@@ -1,11 +1,11 @@
-//! Thrust from a table over throttle and airspeed.
+//! An effect of the catalogue: thrust from a table.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::atmosphere::SEA_LEVEL_DENSITY;
 use crate::{Channel, Point};
 
-/// Thrust as a table over throttle and airspeed.
+/// Thrust along body x, interpolated in a table over throttle and airspeed.
 pub struct ThrustTable;
 
 impl Effect for ThrustTable {

@@ -1,10 +1,10 @@
-//! Lift that depends on the rate of the angle of attack.
+//! Lift and pitching moment that depend on the rate of the angle of attack.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Lift and pitching moment due to the rate of the angle of attack.
+/// The effect `unsteady_lift`: lift and pitching moment are proportional to α̇ c/(2V).
 pub struct UnsteadyLift;
 
 impl Effect for UnsteadyLift {

@@ -1,4 +1,6 @@
-//! Check that a formula is finite in all flight conditions of an aircraft.
+//! Check that the formula of an effect is finite in all flight conditions of an aircraft.
+//!
+//! A corner is a point at which each variable of the formula is at an end of its range.
 
 use super::variable::Variable;
 use super::written::Written;
@@ -8,8 +10,7 @@ use crate::point::Base;
 use crate::rigid_body::ForceAxes;
 use crate::{AirData, Channel, Controls, Point, State};
 
-/// Number of variables up to which all corners of the variables' ranges are tried. A formula with more variables is tried
-/// at no more corners.
+/// Number of variables up to which all corners are tried. A formula with more variables is tried at the same number of corners.
 const ALL_CORNERS: usize = 12;
 
 /// Receives terms and records whether all of them are finite.
@@ -21,13 +22,13 @@ impl Terms<f64> for Finite {
     }
 }
 
-/// Checks that an effect is finite where its variables are at the ends of their ranges, in the middle, and at zero.
+/// Checks that an effect is finite at the corners, in the middle of all ranges, and at zero.
 ///
-/// The shape constants first have the values of the file. The check is then repeated with each of them in turn at each of
-/// its bounds, because a fit may reach a bound.
+/// The shape constants (coefficients in which the formula is nonlinear) first have the values of the file. The check is then
+/// repeated with each of them in turn at each of its bounds, because a fit may reach a bound.
 ///
 /// # Errors
-/// If a term is not finite. The error names the point and the remedy.
+/// If a term is not finite. The error states the point and the remedy.
 pub fn check(effect: &Written) -> Result<(), String> {
     let linear = effect.about.coefficients.len() - effect.about.shape;
     let own = &effect.values[linear..];
@@ -44,7 +45,7 @@ pub fn check(effect: &Written) -> Result<(), String> {
     Ok(())
 }
 
-/// Checks all these points with given shape constants.
+/// Checks the effect at the corners, in the middle of all ranges, and at zero, with the shape constants `shape`.
 fn everywhere(effect: &Written, shape: &[f64]) -> Result<(), String> {
     let variables = effect.variables();
     let tried = 1usize << variables.len().min(ALL_CORNERS);

@@ -1,9 +1,9 @@
-//! Physical dimensions of units.
+//! Physical dimensions, with which the units in effect files are checked.
 
 use std::fmt;
 
-/// Exponents of kilogram, metre and second. They are stored doubled, because the square root of a unit must be
-/// representable. A radian is dimensionless.
+/// The exponents of kilogram, metre and second. They are stored doubled, so that half-integer exponents (from square roots) are
+/// whole numbers. A radian is dimensionless.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dimension([i16; 3]);
 
@@ -28,7 +28,7 @@ impl Dimension {
     /// Dimension of a moment.
     pub const MOMENT: Dimension = Dimension([2, 4, -4]);
 
-    /// The dimension kg^`mass` m^`length` s^`time`.
+    /// Dimension of kg, m and s raised to the powers `mass`, `length` and `time`.
     pub const fn new(mass: i16, length: i16, time: i16) -> Dimension {
         Dimension([2 * mass, 2 * length, 2 * time])
     }

@@ -1,4 +1,5 @@
-//! Expression tree of a formula, and its text form.
+//! Expression tree of a formula in an effect file, and the conversion of the tree to text. An effect is one physical
+//! contribution to a model's forces and moments.
 
 use std::fmt;
 
@@ -20,13 +21,14 @@ pub enum Node {
     Number(f64),
     /// A variable of the flight, for example α.
     Variable(Variable),
-    /// A parameter, given by its index in the effect's list of parameters.
+    /// The parameter with this index in the effect's list of parameters.
     Parameter(usize),
     /// A function or operator with its arguments.
     Call(Function, Vec<Expression>),
     /// An expression raised to an integer power.
     Power(Box<Expression>, i16),
-    /// A function of one argument given by points (argument, value), linear between them and constant beyond them.
+    /// A function of one argument that is given by points (argument, value). It is linear between the points and constant
+    /// outside of them.
     Table(Box<Expression>, Vec<[f64; 2]>),
 }
 
@@ -77,12 +79,12 @@ functions! {
 }
 
 impl Function {
-    /// The function called `name`. `None` for operators and unknown names.
+    /// The function with this name in formulas; `None` for operators and unknown names.
     pub fn from_name(name: &str) -> Option<Function> {
         Function::ALL.iter().copied().find(|f| f.name() == name && !f.is_operator())
     }
 
-    /// Whether it is an operator, which is written as a sign.
+    /// Whether it is an operator, such as `+`.
     pub fn is_operator(self) -> bool {
         use Function::{Add, Divide, Multiply, Negate, Subtract};
         matches!(self, Add | Subtract | Multiply | Divide | Negate)
@@ -93,7 +95,7 @@ impl Function {
         matches!(self, Function::Lag | Function::Delay)
     }
 
-    /// Whether the function or its slope is discontinuous at some argument.
+    /// Whether the function or its derivative is discontinuous at some value of an argument.
     pub fn has_kink(self) -> bool {
         use Function::{Abs, Deadband, Max, Min, Sign};
         matches!(self, Abs | Min | Max | Sign | Deadband)
@@ -101,12 +103,12 @@ impl Function {
 }
 
 impl Expression {
-    /// An expression of the number `x`.
+    /// The expression that is the number `x`.
     pub fn number(x: f64) -> Expression {
         Expression { node: Node::Number(x), at: 0 }
     }
 
-    /// A call of `function`, positioned at its first argument.
+    /// A call of `function` with these arguments. Its position in the text is that of the first argument.
     pub fn call(function: Function, arguments: Vec<Expression>) -> Expression {
         let at = arguments.first().map_or(0, |e| e.at);
         Expression { node: Node::Call(function, arguments), at }
@@ -142,7 +144,7 @@ impl Expression {
         of(&self.node) || self.children().iter().any(|child| child.any(of))
     }
 
-    /// The variables that occur, each once, in the order of `Variable::ALL`.
+    /// The variables that occur in the expression, each once, in the order of `Variable::ALL`.
     pub fn variables(&self) -> Vec<Variable> {
         let named = |v: &Variable| self.any(&|node| *node == Node::Variable(*v));
         Variable::ALL.iter().copied().filter(named).collect()
@@ -153,13 +155,13 @@ impl Expression {
         1 + self.children().iter().map(Expression::size).sum::<usize>()
     }
 
-    /// The formula as text that can be parsed again, with the parameter names `names`.
+    /// The expression as text that can be parsed again. `names` are the names of the parameters.
     pub fn written<'a>(&'a self, names: &'a [&'a str]) -> Written<'a> {
         Written { of: self, names }
     }
 }
 
-/// A formula with its parameter names, for formatting.
+/// An expression with the names of its parameters, for conversion to text.
 pub struct Written<'a> {
     of: &'a Expression,
     names: &'a [&'a str],

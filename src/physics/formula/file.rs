@@ -1,4 +1,6 @@
-//! Reader of effect files. An effect file is a TOML file with one effect.
+//! Reader of effect files. An effect file is a TOML file with the formulas of one effect: for each channel (a force or moment)
+//! a `factor` without parameters times a `shape` with parameters. Parameters in which the shapes are linear are coefficients.
+//! The other parameters are shape constants.
 
 use std::collections::BTreeMap;
 
@@ -135,7 +137,7 @@ struct Placed {
     shape_at: usize,
 }
 
-/// The text of a file, in which faults are located.
+/// The text of a file, from which line and column of a fault are found.
 struct Places<'a> {
     text: &'a str,
 }
@@ -269,7 +271,8 @@ fn renumber(of: &mut Expression, order: &[usize]) {
     }
 }
 
-/// Checks that the term `factor` · `part` · parameter `name` has the dimension of its channel.
+/// Checks that the term `factor` · `part` · parameter `name` has the dimension of its channel. `unit` is the dimension of this
+/// parameter, and `dimensions` are those of all parameters.
 fn balance(
     channel: Channel,
     factor: Option<Dimension>,

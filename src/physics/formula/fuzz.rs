@@ -1,4 +1,4 @@
-//! Fuzz test of the reader of effect files: none of thousands of broken files may cause a panic.
+//! Fuzz test of the reader of effect files, which define an effect by a formula. No broken file may cause a panic.
 
 use rand::RngExt;
 
@@ -7,7 +7,7 @@ use super::file;
 use super::variable::Variable;
 use greylag_num::stream::{Stream, stream};
 
-/// Number of the random stream for the mutations.
+/// Id of the random stream from which the files are drawn.
 const DRAW: u64 = 31;
 /// A valid effect file, from which the broken files are made.
 const WHOLE: &str = r#"schema = 1
@@ -32,8 +32,8 @@ factor = "qbar*S*b"
 shape = "k*max(abs(beta) - w, 0)^2 + k*table(alpha; -0.1:0, 0.2:1)"
 "#;
 
-/// Reads `count` files drawn from `seed`. Each has a random formula or random damage. `observe` receives the text and the
-/// reader's result of each file. Returns the number of valid effect files.
+/// Reads `count` random files drawn from `seed`. Each is a valid file with a random formula or with random damage. Passes the
+/// text of each file and the reader's result to `observe`. Returns the number of valid files.
 pub fn run(count: usize, seed: u64, observe: &mut dyn FnMut(&str, &Result<(), String>)) -> usize {
     let mut random = stream(seed, &[DRAW]);
     let mut good = 0;
@@ -46,7 +46,7 @@ pub fn run(count: usize, seed: u64, observe: &mut dyn FnMut(&str, &Result<(), St
     good
 }
 
-/// `WHOLE` with a random factor and shape.
+/// `WHOLE` with a random formula in the entries `factor` and `shape`.
 fn grown(random: &mut Stream) -> String {
     let depth = random.random_range(0..7);
     let shape = format!("k*({})", term(random, depth));
@@ -84,7 +84,7 @@ fn pick<T: Copy>(random: &mut Stream, all: &[T]) -> T {
     all[random.random_range(0..all.len() as u32) as usize]
 }
 
-/// `WHOLE` with characters removed, inserted or copied at random.
+/// `WHOLE` with random pieces removed, inserted or copied.
 fn damaged(random: &mut Stream) -> String {
     const ODD: [&str; 24] = [
         "(",

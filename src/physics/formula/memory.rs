@@ -1,4 +1,4 @@
-//! The `lag(…)` and `delay(…)` terms of a formula: their check and evaluation.
+//! Checks and evaluates the terms `lag(…)` (first-order lag) and `delay(…)` (dead time) of a formula in an effect file.
 
 use super::expression::{Expression, Function, Node};
 use super::parser::Fault;
@@ -11,23 +11,23 @@ use crate::rigid_body::ForceAxes;
 use crate::{AirData, Controls, Point, State};
 use greylag_num::Real;
 
-/// Longest delay, s. The number of stored samples limits it.
+/// Longest delay, s. It is limited by the number of stored samples.
 pub const LONGEST_DELAY_S: f64 = (PAST - 2) as f64 * STEP;
 
 /// A lag or delay term of a formula.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Memory {
     pub(super) function: Function,
-    /// Argument of the lag or delay.
+    /// Argument of the lag or delay, as a tape (a list of operations).
     pub(super) argument: Tape,
-    /// Index of the time constant or delay among the effect's shape constants.
+    /// Index of the time constant or delay among the effect's shape constants, the parameters in which the effect is nonlinear.
     pub(super) time: u16,
 }
 
 impl Memory {
     /// Value of the argument under `controls`. The lag or delay settles to this value.
     ///
-    /// It is not inlined, because a copy of the tape in each planner's kernel would add minutes to the compilation.
+    /// It is not inlined, because a copy of the tape's interpreter in each planner would add minutes to the compilation.
     #[inline(never)]
     pub fn settled<R: Real>(&self, controls: &Controls<R>, shape: &[f64]) -> R {
         let zero = R::zero();
@@ -57,7 +57,7 @@ impl Memory {
         value
     }
 
-    /// The lagged or delayed value under `controls`. To be called once every [`STEP`].
+    /// The lagged or delayed value under `controls`. It must be called once every [`STEP`], because it advances `past`.
     #[inline(always)]
     pub fn act<R: Real>(&self, controls: &Controls<R>, shape: &[f64], past: &mut Past<R>) -> R {
         let now = self.settled(controls, shape);
@@ -103,8 +103,8 @@ fn refusal(function: Function, all: &[Expression], bounds: &[[f64; 2]]) -> Optio
             other.name()
         ));
     }
-    // A number has no bounds. A search also adds all effects without a shape constant to one model, which would then have
-    // too many lags.
+    // A literal number has no bounds. A second reason: a search adds all effects without shape constants to one model,
+    // which would then have too many lags.
     let Node::Parameter(k) = time.node else {
         return Some(format!("the time of {name} must be a parameter in s, so that it has bounds"));
     };

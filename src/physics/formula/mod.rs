@@ -1,7 +1,8 @@
 //! Formulas of effects that are read from files and need no compilation of the program.
 //!
-//! The parser turns a text into a tree ([`parser`]). The units of the tree are checked ([`units`]). The tree is then split
-//! into the factor of each coefficient ([`split`]). The factors are compiled to a list of operations over
+//! An effect is one physical contribution to the forces and moments of a model. The parser turns the text of its formula into
+//! a tree ([`parser`]). The units of the tree are checked ([`units`]). The tree is then split into the factor of each
+//! coefficient ([`split`]). The factors are compiled to a list of operations on numbers of the type
 //! [`Real`](greylag_num::Real) ([`tape`]). An effect file ([`mod@file`]) has one effect, which
 //! [`Kind::Written`](crate::effects::Kind::Written) makes usable like a compiled effect.
 

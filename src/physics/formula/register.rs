@@ -1,8 +1,9 @@
-//! Registry of effects from files: shipped effects, and effects that this process has read.
+//! Registry of the effects that are defined by effect files (TOML): effects of shipped files, and effects of files that this
+//! process has read.
 //!
-//! An effect of a file is found by its id, like an effect of the catalogue. It is kept until the process ends. A file that
-//! is read again gives the same effect. If the file was edited in between, the new effect replaces the earlier one for
-//! later look-ups, and models that were loaded before keep the earlier effect.
+//! These effects are found by their ids, like the effects of the catalogue. An effect that was read is kept until the process
+//! ends. If its file is read again unchanged, the same effect is returned. If the file was edited in between, [`find`] returns
+//! the new effect from then on, and models that were loaded before keep the earlier effect.
 
 use std::path::{Path, PathBuf};
 use std::sync::{LazyLock, PoisonError, RwLock};
@@ -27,7 +28,7 @@ pub fn shipped() -> &'static [Written] {
     &SHIPPED
 }
 
-/// The most recently read effect with this id, otherwise the shipped one. `None` if there is no such effect.
+/// The most recently read effect with this id. If none was read, the shipped one. `None` if there is no such effect.
 pub fn find(id: &str) -> Option<&'static Written> {
     let read = READ.read().unwrap_or_else(PoisonError::into_inner);
     let own = read.iter().rev().copied().find(|effect| effect.about.id == id);

@@ -1,4 +1,5 @@
-//! Splitting of a formula that is linear in its coefficients into the factor of each coefficient.
+//! Splits the formula of an effect into the factor of each parameter in which it is linear. `k*alpha*beta + m*p` is thus split
+//! into `alpha*beta` for k and `p` for m. Parameters in which a formula is linear are the coefficients of the effect.
 
 use super::expression::{Expression, Function, Node};
 use super::parser::Fault;
@@ -6,10 +7,10 @@ use super::parser::Fault;
 /// The index of each parameter in which a formula is linear, with the expression that the parameter multiplies.
 pub type Parts = Vec<(usize, Expression)>;
 
-/// For each of `count` parameters, whether all of `formulas` are linear in it.
+/// For each of `count` parameters, whether it counts as linear in all of `formulas`.
 ///
-/// A formula is not linear in a parameter of a function or a denominator. In a product of parameters, only the leftmost one
-/// counts as linear.
+/// A parameter within a function, a power or a denominator does not. Of several parameters that are multiplied, only the
+/// leftmost does.
 pub fn linear(formulas: &[Expression], count: usize) -> Vec<bool> {
     let mut linear = vec![true; count];
     loop {
@@ -25,7 +26,7 @@ fn holds(of: &Expression, linear: &[bool]) -> bool {
     of.any(&|node| matches!(node, Node::Parameter(k) if linear[*k]))
 }
 
-/// Clears the marks in `linear` of the parameters in which `of` is not linear.
+/// Sets `linear` to false for each parameter that does not count as linear in `of`.
 fn mark(of: &Expression, linear: &mut [bool]) {
     match &of.node {
         Node::Call(Function::Add | Function::Subtract | Function::Negate, all) => {
@@ -46,7 +47,7 @@ fn mark(of: &Expression, linear: &mut [bool]) {
     }
 }
 
-/// Clears the marks in `linear` of all parameters in `of`.
+/// Sets `linear` to false for all parameters in `of`.
 fn bend(of: &Expression, linear: &mut [bool]) {
     of.visit(&mut |e| {
         if let Node::Parameter(k) = e.node {
@@ -55,10 +56,10 @@ fn bend(of: &Expression, linear: &mut [bool]) {
     });
 }
 
-/// The factor in `formula` of each parameter that `linear` marks.
+/// For each parameter for which `linear` is true, the factor in `formula` by which it is multiplied.
 ///
 /// # Errors
-/// If a term contains no marked parameter. Such a term could not be made zero by a coefficient.
+/// If a term of the formula contains no such parameter. No coefficient could then be fitted to make the term zero.
 pub fn parts(formula: &Expression, linear: &[bool]) -> Result<Parts, Fault> {
     let mut all: Parts = Vec::new();
     for (parameter, part) in divided(formula, linear) {
@@ -80,8 +81,8 @@ pub fn parts(formula: &Expression, linear: &[bool]) -> Result<Parts, Fault> {
     Ok(all)
 }
 
-/// The terms of `of`, each without its marked parameter but with this parameter's index. The index is `None` if a term has
-/// no marked parameter.
+/// The terms of `of`. Each is divided by its parameter for which `linear` is true, and comes with the index of this parameter.
+/// The index is `None` if the term has no such parameter.
 fn divided(of: &Expression, linear: &[bool]) -> Vec<(Option<usize>, Expression)> {
     if !holds(of, linear) {
         return vec![(None, of.clone())];
@@ -107,7 +108,7 @@ fn divided(of: &Expression, linear: &[bool]) -> Vec<(Option<usize>, Expression)>
         Node::Call(Function::Divide, all) => {
             each(&all[0], &|part| Expression::call(Function::Divide, vec![part, all[1].clone()]))
         }
-        // no other node contains a marked parameter: `mark` has cleared the marks of parameters in such nodes
+        // no other node contains a parameter for which `linear` is true, because `mark` has set it to false for those
         _ => vec![(None, of.clone())],
     }
 }

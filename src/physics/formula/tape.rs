@@ -1,7 +1,8 @@
 //! A formula compiled to a list of operations, generic over the scalar type.
 //!
 //! The list is the program of a stack machine. The top value of the stack is kept outside the array of the others. With
-//! [`Dual`](greylag_num::Dual) numbers the program gives the derivatives with respect to states and controls.
+//! [`Dual`](greylag_num::Dual) numbers the program gives the derivatives with respect to states and controls. Parameters in
+//! which the formula is linear are its coefficients; the others are shape constants.
 
 use super::expression::{Expression, Function, Node};
 use super::memory::Memory;
@@ -12,8 +13,8 @@ use greylag_num::{Real, Table};
 /// Largest number of values on the stack below the top.
 const DEPTH: usize = 12;
 
-/// Largest number of operations and multiplied variables, counted together, of an effect. It limits the computation time
-/// of a model's step.
+/// Largest sum of the numbers of operations and of multiplied variables of an effect. It limits the computation time of a
+/// model's step.
 const LONGEST: usize = 4000;
 
 /// An operation of the stack machine.

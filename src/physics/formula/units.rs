@@ -1,22 +1,22 @@
-//! Check of the units of a formula.
+//! Checks that the units in a formula of an effect file balance, for example in a sum.
 
 use super::dimension::Dimension;
 use super::expression::{Expression, Function, Node};
 use super::parser::Fault;
 
-/// Dimension of a term of a formula.
+/// Physical dimension of a term of a formula.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Measure {
-    /// A definite dimension.
+    /// The term has this dimension.
     Of(Dimension),
-    /// Zero, which is compatible with any dimension.
+    /// The term is zero, which is compatible with any dimension.
     Any,
 }
 
-/// Dimension of `formula`, whose parameters have `dimensions`. `None` if the formula is always zero.
+/// Physical dimension of `formula`, whose parameters have the dimensions `dimensions`. `None` if the formula is always zero.
 ///
 /// # Errors
-/// If the units do not balance. The error has the position and the dimensions that do not match.
+/// If the units do not balance. The error states the position in the formula and the dimensions that do not match.
 pub fn dimension(
     formula: &Expression,
     dimensions: &[Dimension],
@@ -41,7 +41,7 @@ fn measure(of: &Expression, dimensions: &[Dimension]) -> Result<Measure, Fault> 
         },
         Node::Table(x, _) => {
             part(x)?;
-            // the abscissae have the unit of the variable, the ordinates have none
+            // the first number of a pair in a table has the unit of the variable, the second has none
             Of(Dimension::NONE)
         }
         Node::Call(function, all) => match function {
@@ -78,7 +78,7 @@ fn measure(of: &Expression, dimensions: &[Dimension]) -> Result<Measure, Fault> 
     })
 }
 
-/// Dimension of a lag or delay, which is that of its argument. Its time must be in s.
+/// Dimension of a lag or delay: that of its first argument. Its second argument must be a time in s.
 fn timed(
     function: Function,
     all: &[Expression],

@@ -1,4 +1,4 @@
-//! The variables of formulas, one line per variable.
+//! The variables that a formula of an effect file may contain, one line per variable.
 
 use super::dimension::Dimension;
 use crate::effects::Needs;
@@ -48,7 +48,7 @@ macro_rules! variables {
                 match self { $(Variable::$id => [$low, $high],)* }
             }
 
-            /// Input needed to evaluate the variable.
+            /// Data needed to evaluate the variable.
             pub const fn needs(self) -> Needs {
                 match self { $(Variable::$id => Needs::$needs,)* }
             }

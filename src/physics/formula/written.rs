@@ -1,4 +1,4 @@
-//! An effect from an effect file, ready for evaluation.
+//! An effect that was read from an effect file and can be evaluated. An effect is one contribution to forces and moments.
 
 use super::expression::{Expression, Node};
 use super::memory::Memory;
@@ -19,14 +19,14 @@ pub enum Status {
     Accepted,
 }
 
-/// Contribution of an effect to one channel.
+/// Contribution of an effect to one channel, which is a component of force or moment. It is `factor` times `shape`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
     /// Channel of the contribution.
     pub channel: Channel,
-    /// Factor without parameters by which the shape is multiplied.
+    /// Factor that contains no parameters.
     pub factor: Expression,
-    /// Sum of terms, each multiplied by a parameter.
+    /// Sum of terms, each of which is multiplied by a parameter.
     pub shape: Expression,
 }
 
@@ -50,8 +50,8 @@ pub struct Written {
 }
 
 impl Written {
-    /// Inputs of the effect, at least `Needs::Base`: a planner's sum over the effects that need only the point must contain
-    /// no code of formulas.
+    /// The inputs that the effect needs, at least `Needs::Base`. Formulas are therefore never evaluated in the sum over the
+    /// effects that need only state, controls and airflow, where a planner spends most of its time.
     pub const fn needs(&self) -> Needs {
         self.needs
     }
@@ -70,7 +70,7 @@ impl Written {
         self.tape.memories()
     }
 
-    /// Value in the file of the coefficient at index `coefficient`, with the effect's source and the prior standard deviation.
+    /// The value of the coefficient at index `coefficient` in the file, with its source and its prior standard deviation.
     pub fn number(&self, coefficient: usize) -> Sourced {
         Sourced {
             bounds: None,

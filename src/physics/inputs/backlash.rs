@@ -4,7 +4,7 @@ use super::{InputEffect, Past};
 use greylag_num::Real;
 use crate::effects::{Coefficient, Entry, coefficient};
 
-/// Backlash that a surface crosses at every reversal.
+/// Backlash of a surface: after a reversal of its input, the surface moves only when the play has been crossed.
 pub struct Backlash;
 
 impl InputEffect for Backlash {

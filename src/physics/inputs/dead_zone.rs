@@ -1,10 +1,10 @@
-//! Dead zone of the surfaces at small deflections.
+//! Input effect of a dead zone of the surfaces. An input effect changes the deflections before they act on the aircraft.
 
 use super::{InputEffect, Past};
 use greylag_num::Real;
 use crate::effects::{Coefficient, Entry, coefficient};
 
-/// A dead zone about the neutral position.
+/// Removes deflections within the half width of the zone, and reduces larger ones by the half width.
 pub struct DeadZone;
 
 impl InputEffect for DeadZone {

@@ -1,4 +1,5 @@
-//! Input effects: they act between the actuators' measured positions and the acting deflections. Each has its own file.
+//! Input effects, such as a lag or backlash: they act between the actuators' measured positions and the acting deflections.
+//! Each has its own file.
 //!
 //! Input effects have memory and are nonlinear in their constant. Several effects of one model act one after the other in
 //! the order of the list at the end of this file. A new effect needs a file in this folder and its name in that list.
@@ -6,8 +7,8 @@
 //! Input effects apply wherever a model is stepped: open-loop simulations, simulated flights and the planner. The planner
 //! does not observe the acting deflections and assumes surfaces and throttle at rest before its plan. Trim neglects input
 //! effects; in steady flight only the dead zone would matter. The linear model, and thus the design of the LQI, neglects
-//! all of them. The LQI's integrators compensate constant errors caused by this. The cost of a lag or delay is measured
-//! in `tests/model/effects_lqi.rs`.
+//! all of them. The LQI's integrators compensate constant errors caused by this. `tests/model/effects_lqi.rs` measures how
+//! much a lag or delay degrades the LQI.
 
 use crate::Controls;
 use crate::actuators::LAGS;
@@ -98,7 +99,8 @@ impl<R: Real> InputMemory<R> {
         }
     }
 
-    /// Selects `then` in the SIMD lanes in which `chosen` is above zero, and this memory in the others.
+    /// Returns a memory with the values of `then` in the SIMD lanes in which `chosen` is above zero, and with those of this
+    /// memory in the other lanes.
     pub fn replaced(&self, chosen: R, then: &Self) -> Self {
         let one = |old: R, new: R| R::where_less(R::zero(), chosen, new, old);
         let past = |old: &Past<R>, new: &Past<R>| Past {

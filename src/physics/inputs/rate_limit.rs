@@ -1,10 +1,10 @@
-//! Rate limit of the surfaces.
+//! An input effect, which changes the commanded deflections before they act: a rate limit of the surfaces.
 
 use super::{InputEffect, Past, STEP};
 use greylag_num::Real;
 use crate::effects::{Coefficient, Entry, coefficient};
 
-/// A limit on the rate of a surface.
+/// A limit on the rate of deflection of each surface.
 pub struct RateLimit;
 
 impl InputEffect for RateLimit {

@@ -1,10 +1,10 @@
-//! Lag of the thrust behind the throttle, due to the inertia of a propeller or the spool of a turbine.
+//! Lag of the thrust behind the throttle, due to the inertia of a propeller or of a turbine's rotor.
 
 use super::{ActuatorLag, Acts, InputEffect, Past};
 use greylag_num::Real;
 use crate::effects::{Coefficient, Entry, coefficient};
 
-/// A first-order lag between the measured throttle and the acting throttle.
+/// A first-order lag from the recorded throttle position to the throttle that acts on the thrust.
 pub struct ThrustLag;
 
 impl InputEffect for ThrustLag {

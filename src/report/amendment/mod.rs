@@ -1,4 +1,4 @@
-//! Input of the report on an amendment of a model.
+//! Input of the report on an amendment. An amendment adds effects to a model and re-estimates its coefficients from flights.
 
 pub(super) mod page;
 
@@ -6,16 +6,17 @@ use crate::Page;
 use greylag_sysid::amend::Amendment;
 use greylag_sysid::compare::{Answer, Comparison};
 
-/// Result of an amendment, with the files and the command line that produced it.
+/// Result of an amendment and its provenance.
 #[derive(Clone, Debug)]
 pub struct AmendmentReport<'a> {
     /// Title of the page.
     pub title: String,
     /// Result of the amendment: fit, evidence and scores.
     pub amendment: &'a Amendment,
-    /// The amendment's answer including the next command; `None` if the report uses the answer of `amendment`.
+    /// Summary of the result with the next command; `None` if the page shows the summary that `amendment` gives.
     pub answer: Option<&'a Answer>,
-    /// Comparison of the models (as given, tuned, amended) with flights that no fit has used; `None` if there is none.
+    /// Comparison of the models (as given, re-estimated, with added effects) with flights that no fit has used; `None` if it was
+    /// not made.
     pub held_out: Option<&'a Comparison>,
     /// Paths of the model file before the amendment and, if one was written, after it.
     pub model_files: Vec<String>,

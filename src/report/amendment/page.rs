@@ -1,4 +1,5 @@
-//! Page of one amendment: the error before and after it, the added effects, and all coefficients.
+//! Page about one amendment: the error before and after it, the added effects, and all coefficients. An amendment adds effects
+//! to a model and re-estimates the coefficients.
 
 use crate::Align::{Left, Right};
 use crate::amendment::AmendmentReport;
@@ -13,7 +14,7 @@ use greylag_sysid::amend::{Amendment, FittedFlight, Parameter};
 use greylag_sysid::compare::HorizonScore;
 use greylag_sysid::diagnose::Tuned;
 
-/// Number of prominent findings.
+/// Number of sentences about the amendment that are shown prominently.
 const LEADING: usize = 2;
 
 /// The page of `report`: first the answer, then the evidence for it.
@@ -57,7 +58,7 @@ fn in_words(a: &Amendment) -> Section {
     }
 }
 
-/// Section with the errors of each model at each horizon.
+/// Section with the prediction errors of the model as given, re-estimated and amended, at each horizon.
 fn before_and_after(a: &Amendment) -> Section {
     let models = [("as given", &a.given), ("tuned", &a.before), ("amended", &a.after)];
     let columns = [
@@ -122,7 +123,7 @@ fn effects(a: &Amendment) -> Section {
     }
 }
 
-/// Section on the coefficients of the added effects, with the estimates from single flights.
+/// Section on the coefficients of the added effects, with the estimates from each flight alone.
 fn added(a: &Amendment) -> Section {
     let columns =
         [("Coefficient", Left), ("Value", Right), ("95 % interval", Right), ("What it is", Left)];
@@ -154,7 +155,7 @@ fn by_flight(p: &Parameter) -> crate::Whiskers {
     suspects::flight_by_flight(p.name.clone(), "", flights, (p.value, p.ci95))
 }
 
-/// The coefficients that the model had before effects were added.
+/// The coefficients that the model had before effects were added, with their prior and estimated values.
 fn tuned(a: &Amendment) -> Vec<Tuned> {
     let own = a.parameters.iter().filter(|p| !p.added);
     own.map(|p| Tuned {
@@ -202,7 +203,7 @@ fn sensors(a: &Amendment) -> Section {
     Section::new("Sensors", &note, vec![Figure::Table(table)])
 }
 
-/// Constants of each flight: name, value with standard deviation, factor to the displayed unit, and unit.
+/// Sensor errors estimated for a flight: name, value with standard deviation, factor to the displayed unit, and this unit.
 fn constants(f: &FittedFlight) -> [(&'static str, [f64; 2], f64, &'static str); 4] {
     let degree = 1f64.to_degrees();
     [

@@ -1,4 +1,4 @@
-//! Input of the report on a comparison of models with flights.
+//! Report on a comparison of models with recorded flights.
 
 pub(super) mod page;
 pub(super) mod place;
@@ -14,7 +14,7 @@ use greylag_sysid::compare::Comparison;
 pub struct ComparisonReport<'a> {
     /// Title of the page.
     pub title: String,
-    /// Result of the comparison.
+    /// Result of the comparison, with the models' errors.
     pub comparison: &'a Comparison,
     /// Paths of the model files, in the order of the comparison's models.
     pub model_files: Vec<String>,
@@ -22,7 +22,7 @@ pub struct ComparisonReport<'a> {
     pub log_files: Vec<String>,
     /// The command line that ran the comparison.
     pub command_line: String,
-    /// Names and versions or hashes of further programs or files.
+    /// Further programs or files with their versions or hashes: name, then version or hash.
     pub versions: Vec<(String, String)>,
 }
 

@@ -1,4 +1,5 @@
-//! Page of one comparison of models with flights.
+//! The page on a comparison of models with flights. A channel is a force or moment coefficient that model and flight are
+//! compared in. A regime is a flight condition, such as a range of the angle of attack.
 
 use crate::comparison::ComparisonReport;
 use crate::comparison::{place, regimes, tables, traces};
@@ -9,9 +10,9 @@ use crate::{
 use greylag_sysid::compare::answer::Way;
 use greylag_sysid::compare::{ChannelId, Comparison, GrowthPoint, ModelResult};
 
-/// Number of prominent findings on the first model.
+/// Number of sentences on the first model that are shown prominently.
 const LEADING: usize = 2;
-/// Number of sentences on each further model.
+/// Largest number of sentences on each further model.
 const OF_OTHERS: usize = 2;
 
 /// The page of `report`: first the answer, then the evidence for it.
@@ -20,14 +21,14 @@ pub fn comparison_page(report: &ComparisonReport) -> Page {
     let answer = c.answer.clone();
     let boxed = AnswerBox { answer, place: place::of_models(&c.models), first: First::Error };
     let answer = Figure::Answer(Box::new(boxed));
-    // for a single model, the box above names the worst channel
+    // with a single model no sentence is prominent, because the answer box already names the worst channel
     let leading = if c.models.len() == 1 { 0 } else { LEADING };
     let mut said = findings(c, leading);
     if let [only] = &c.models[..] {
         worst_first(&mut said.rest, only);
     }
     let words = Figure::Findings(said);
-    // the page of a single model begins with its failures, that of several models with their differences
+    // a single model's sentences follow the answer box; those of several models come after the figures
     let (first, later) = match c.models.len() {
         0 | 1 => (vec![answer, words], Section::default()),
         _ => (vec![answer], Section::new("In words", "", vec![words])),
@@ -48,10 +49,10 @@ pub fn comparison_page(report: &ComparisonReport) -> Page {
     Page { title: report.title.clone(), subtitle: subtitle(c), sections }
 }
 
-/// The short section of a flight report: the errors of the model of that flight.
+/// The section of a flight report on the errors of the model with which the aircraft was flown.
 pub(crate) fn short_section(c: &Comparison) -> Section {
     let mut found = findings(c, LEADING);
-    // The links point to figures that only the page of the comparison contains.
+    // the links are removed, because the figures to which they point are on the page of the comparison only
     for finding in found.lead.iter_mut().chain(&mut found.rest) {
         finding.link = None;
     }
@@ -63,8 +64,8 @@ pub(crate) fn short_section(c: &Comparison) -> Section {
 const UNEXPLAINED_NOTE: &str = "Share of each channel's variation that is neither explained by \
      the model nor by the sensors' noise. Over 100 % the model is worse than a constant.";
 
-/// The note on the unexplained share. If the second model was tuned before its effects were added, the note adds that tuning
-/// alone removes part of the first model's unexplained share.
+/// The note on the unexplained share. If the second model is the first with re-estimated ("tuned") coefficients and added
+/// effects, the note adds that tuning alone removes much of the first model's unexplained share.
 fn unexplained_note(c: &Comparison) -> String {
     let tuned = c.answer.numbers.steps.iter().any(|step| step.way == Way::Tuned);
     match (tuned, &c.models[..]) {
@@ -87,12 +88,12 @@ fn subtitle(c: &Comparison) -> String {
     )
 }
 
-/// Display name of a channel: symbol and name.
+/// Name of a channel for display: its symbol and its name in words.
 pub(crate) fn channel_name(id: ChannelId) -> String {
     format!("{} {}", id.symbol(), id.name())
 }
 
-/// The sentences on all models, of which the first `leading` on the first model are prominent.
+/// The sentences on all models. The first `leading` sentences on the first model are prominent.
 fn findings(c: &Comparison, leading: usize) -> Findings {
     let mut lead = Vec::new();
     let mut rest = Vec::new();
@@ -117,7 +118,7 @@ fn findings(c: &Comparison, leading: usize) -> Findings {
     Findings { lead, rest, ..Findings::default() }
 }
 
-/// Moves the sentence on the channel that the box names to the front of `sentences`.
+/// Moves the sentence on the channel that the answer box names to the front of `sentences`.
 fn worst_first(sentences: &mut [Finding], model: &ModelResult) {
     let Some((channel, _)) = place::worst(model) else { return };
     let name = channel_name(channel);
@@ -127,14 +128,14 @@ fn worst_first(sentences: &mut [Finding], model: &ModelResult) {
     }
 }
 
-/// Link to the regimes of the channel whose worst regime `sentence` describes.
+/// A link to the figure with the regimes of the channel whose worst regime `sentence` describes; `None` if it describes none.
 fn link(model: &ModelResult, sentence: &str) -> Option<Link> {
     let plain = |text: &str| text.trim_end_matches('.').to_lowercase();
     let of = model.channels.iter().find(|ch| plain(&ch.worst_regime) == plain(sentence))?;
     Some(Link { anchor: regimes::ANCHOR.into(), option: channel_name(of.channel) })
 }
 
-/// The models with their line styles.
+/// The name and the line style of each model.
 pub(crate) fn keys(c: &Comparison) -> Vec<(String, Style)> {
     c.models.iter().enumerate().map(|(i, m)| (m.name.clone(), Style::nth(i))).collect()
 }
@@ -176,7 +177,7 @@ pub(crate) fn growth(c: &Comparison) -> Vec<Figure> {
     let longest = c.models.iter().map(|m| &m.growth).max_by_key(|g| g.len());
     let Some(longest) = longest.filter(|g| !g.is_empty()) else { return Vec::new() };
     let curves = |title: &str, value: fn(&GrowthPoint) -> f64| {
-        // All models have the same runs, so their times agree up to the end of the shorter curve.
+        // all models have the same runs, so the curves have the same times up to the end of the shorter one
         let series = c.models.iter().enumerate().map(|(i, m)| {
             let mut values: Vec<f64> = m.growth.iter().map(value).collect();
             values.resize(longest.len(), f64::NAN);
@@ -197,7 +198,7 @@ pub(crate) fn growth(c: &Comparison) -> Vec<Figure> {
     ]
 }
 
-/// One choice option per channel, for the channels that have figures.
+/// The alternatives of a choice between channels: one for each channel for which `figures` returns any.
 pub(crate) fn by_channel(
     c: &Comparison,
     figures: impl Fn(ChannelId) -> Vec<Figure>,

@@ -1,10 +1,11 @@
-//! Sentence for the answer box on the channel with the largest unexplained share.
+//! Sentence on the channel (force, moment or rate) with the largest unexplained share. This share is the variance of the
+//! residual without noise, as a fraction of the measured variance without noise.
 
 use crate::kit::numbers::number;
 use greylag_sysid::compare::{ChannelId, ModelResult};
 
-/// Share above which the sentence gives the error as a multiple of the measured variation, because a percentage of four
-/// or more digits is hard to read.
+/// Share above which the sentence states the rms error as a multiple of the measured variation. A percentage of four or
+/// more digits would be hard to read.
 const MULTIPLE: f64 = 10.0;
 
 /// Channel in which the model leaves the largest share unexplained, and this share. `None` without finite shares.

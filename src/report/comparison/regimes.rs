@@ -1,4 +1,6 @@
-//! Residual of each channel over each regime variable, and over α and β together.
+//! The figures that show in which flight conditions a model fails. A channel is a force, a moment or a rate. The figures show the
+//! mean residual (measured minus model) of each channel. It is drawn over each regime variable (a quantity of the flight
+//! condition, such as the airspeed), and as a map over α and β.
 
 use crate::comparison::page::{by_channel, keys};
 use crate::{Choice, Figure, HeatCell, HeatMap, IntervalBins, IntervalPanel, Intervals, Section};
@@ -6,7 +8,7 @@ use greylag_sysid::compare::{
     ChannelId, ChannelResult, Comparison, Map, RegimeBins, RegimeVariable,
 };
 
-/// Anchor of the section, for links from sentences.
+/// Anchor of the section in the page, for links to it.
 pub(crate) const ANCHOR: &str = "regimes";
 
 pub(crate) fn regimes(c: &Comparison) -> Section {
@@ -49,7 +51,7 @@ fn panels(c: &Comparison, id: ChannelId) -> Option<Intervals> {
         let lines: Vec<Option<RegimeBins>> =
             channels.iter().map(|ch| bins(*ch, variable)).collect();
         let Some(some) = lines.iter().flatten().find(|b| !b.bins.is_empty()) else { continue };
-        // A single flight gives no variation between flights.
+        // one flight alone shows no difference between flights
         if variable == RegimeVariable::Flight && some.bins.len() < 2 {
             continue;
         }
@@ -62,7 +64,7 @@ fn panels(c: &Comparison, id: ChannelId) -> Option<Intervals> {
         };
         found.push((explained, panel));
     }
-    // The variable that explains most of the residual comes first.
+    // the variable that explains the largest part of the residual's variance comes first
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     (!found.is_empty()).then(|| Intervals {
         y_label: format!("Measured − model: {} ({})", id.name(), id.unit()),
@@ -101,7 +103,7 @@ fn heat_maps(c: &Comparison, id: ChannelId) -> Vec<Figure> {
         let sizes = all.filter(move |x| x.supported || !supported_only).map(|x| x.mean.abs());
         sizes.filter(|v| v.is_finite()).fold(0.0, f64::max)
     };
-    // A cell with few samples may deviate by chance, so it sets the scale only if every cell has few samples.
+    // a cell with few samples may deviate by chance: it sets the scale only if every cell has few samples
     let limit = [cells(true), cells(false)].into_iter().find(|l| *l > 0.0);
     let Some(limit) = limit else { return Vec::new() };
     let models = c.models.iter().zip(&channels);

@@ -1,4 +1,5 @@
-//! Tables of a comparison: free-run errors, baselines, sensor errors and wind, notes, provenance.
+//! Tables of a comparison of models with recorded flights: free-run errors, baselines, sensor errors and wind, notes,
+//! provenance. A free run simulates a model from a reconstructed state with the recorded actuator positions.
 
 use crate::comparison::ComparisonReport;
 use crate::kit::numbers::{NORMAL_95, interval, number, percent};
@@ -41,7 +42,8 @@ pub(crate) fn summary(c: &Comparison) -> Section {
     Section::new("Free runs", note, figures)
 }
 
-/// Section with the scores of forecasts without aerodynamics over the same free runs. A useful model has smaller errors.
+/// Section with the errors of forecasts that use no aerodynamics, over the same times as the free runs. A useful model has
+/// smaller errors.
 pub(crate) fn baselines(c: &Comparison) -> Section {
     let columns = [
         ("Forecast", Align::Left),
@@ -93,7 +95,7 @@ fn state_cells(s: &StateScore) -> Vec<String> {
     cells
 }
 
-/// Display name and display unit of a state, with the factor from its SI unit.
+/// Display name and display unit of a state, and the factor from its SI unit to the display unit.
 fn people(state: &str) -> (&str, &'static str, f64) {
     let (name, unit) = state.rsplit_once('_').unwrap_or((state, ""));
     let name = match name {

@@ -1,14 +1,17 @@
-//! Measured and predicted states over time: selected stretches of the flights, then whole flights.
+//! Plots of measured and predicted states, forces and moments over time: selected stretches of the flights, then whole flights.
+//!
+//! The states are predicted by free runs: the model is simulated with the recorded actuators from a reconstructed state. The
+//! forces and moments are compared in weak form: they are averaged over a short window with a smooth weight (kernel).
 
 use crate::comparison::page::channel_name;
 use crate::{Choice, ChoiceOption, Figure, Panel, Section, Series, Style, TimeFigure};
 use greylag_sysid::compare::{ChannelId, ChannelTrace, Comparison, FlightTrace, ModelTrace};
 
-/// Length of a stretch, s; a free run usually lasts 3 s.
+/// Length of a stretch, s.
 const STRETCH_S: f64 = 30.0;
 /// Largest number of rows per stretch in a plot.
 const STRETCH_ROWS: usize = 1000;
-/// Largest number of values in the plots of all whole flights together; it keeps the page near 2 MB.
+/// Largest number of values in the plots of all whole flights together. The limit keeps the page near 2 MB.
 const WHOLE_VALUES: usize = 120_000;
 /// Largest number of whole flights in plots.
 const WHOLE_FLIGHTS: usize = 6;
@@ -25,7 +28,7 @@ const STATES: [(&str, &str, f64); 8] = [
 ];
 const DEGREE: f64 = 180.0 / std::f64::consts::PI;
 
-/// A stretch of one flight: index of the flight, range of rows, and scaled squared error of the first model.
+/// A stretch of one flight: index of the flight, range of rows, and mean of the first model's errors (see [`errors`]).
 #[derive(Clone, Copy)]
 struct Stretch {
     flight: usize,
@@ -162,7 +165,7 @@ fn figure(c: &Comparison, flight: usize, rows: std::ops::Range<usize>, most: usi
         Panel::new(title, unit, series)
     });
     let mut figure = TimeFigure::default();
-    // No limit on gaps: thinned rows may be far apart, and rows of NaN separate the segments.
+    // Gaps do not interrupt the lines, because thinned rows may be far apart. Rows of NaN separate the segments.
     figure.add_track(&take(&trace.time_s, 1.0), f64::INFINITY, panels.collect());
     if let (Some(first), Some(last)) =
         (trace.time_s.get(rows.start), trace.time_s.get(rows.end - 1))
@@ -175,7 +178,7 @@ fn figure(c: &Comparison, flight: usize, rows: std::ops::Range<usize>, most: usi
     figure
 }
 
-/// Adds the channels in weak form between two times, s, with one panel per channel.
+/// Adds one panel for each channel, which is a force or moment in weak form, between two times, s.
 fn add_channels(
     figure: &mut TimeFigure,
     c: &Comparison,
@@ -209,7 +212,8 @@ fn add_channels(
     figure.add_track(&take(&any.time_s), f64::INFINITY, panels);
 }
 
-/// Windows between two times, s, for a plot: every nth window, and all windows of NaN, which break the curves.
+/// Indices of the windows that are drawn between two times, s: every nth window, and all windows of NaN, which break the
+/// curves.
 fn thinned(trace: &ChannelTrace, [from, to]: [f64; 2], most: usize) -> Vec<usize> {
     let rows = 0..trace.time_s.len();
     let inside: Vec<usize> = rows.filter(|i| (from..=to).contains(&trace.time_s[*i])).collect();

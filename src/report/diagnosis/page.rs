@@ -1,4 +1,4 @@
-//! Page of one diagnosis: sentences on the missing effects, then the evidence.
+//! Page of a diagnosis, which names the effects that a model lacks: first the findings in words, then the evidence.
 
 use crate::comparison::page::channel_name;
 use crate::diagnosis::DiagnosisReport;
@@ -12,9 +12,9 @@ use crate::{
 use greylag_sysid::compare::{ChannelId, ChannelResult, Comparison, ModelResult, RegimeVariable};
 use greylag_sysid::diagnose::{Diagnosis, Verdict};
 
-/// Number of prominent findings.
+/// Number of findings that are shown prominently, before the others.
 const LEADING: usize = 2;
-/// Share below which a cell of the map is blank.
+/// Share of the residual's variance below which a cell of the map is blank.
 const BLANK: f64 = 0.05;
 
 /// Text by which sentences on sensor errors are recognised; there is one such sentence per flight.
@@ -109,9 +109,10 @@ fn where_it_fails(d: &Diagnosis, failing: Option<&Comparison>) -> Section {
     Section::new("Where it fails", note, figures)
 }
 
-/// Maps of the channels' residuals over regime variables, one per model; the first is shown initially.
+/// Maps of the channels' residuals over the regime variables (those that describe the flight condition), one map for each model.
+/// The first map is shown initially.
 fn maps(c: &Comparison) -> Option<Figure> {
-    // the same colour scale for all models
+    // the colours of all maps have the same scale
     let options: Vec<ChoiceOption> = c
         .models
         .iter()
@@ -121,7 +122,8 @@ fn maps(c: &Comparison) -> Option<Figure> {
     (!choice.options.is_empty()).then_some(Figure::Choice(choice))
 }
 
-/// Map of channels over regime variables: the share of a model's residual that each variable explains.
+/// Map with a row for each channel and a column for each regime variable: the share of the residual's variance that the variable
+/// explains.
 fn map(model: &ModelResult) -> Option<Figure> {
     let channels = &model.channels;
     let variables: Vec<RegimeVariable> = RegimeVariable::CONTINUOUS
@@ -155,7 +157,7 @@ fn cell(channel: &ChannelResult, variable: RegimeVariable) -> GridCell {
     if share.is_nan() || share < BLANK {
         return GridCell { text: String::new(), weight: 0.0 };
     }
-    // The cells of a channel with a small unexplained share are pale.
+    // The cells of a channel are pale if its unexplained fraction is below 10 %.
     let left = channel.unexplained_fraction;
     let importance = if left.is_finite() { (left / 0.1).clamp(0.0, 1.0) } else { 0.0 };
     GridCell { text: percent(share), weight: share * importance }
@@ -196,7 +198,7 @@ fn left(d: &Diagnosis) -> Figure {
     };
     let groups: Vec<BarGroup> = d.channels.iter().map(group).collect();
     let all = groups.iter().flat_map(|g| &g.values).copied().filter(|v| v.is_finite());
-    // The scale ends at the largest share, between 5 % and 100 %, so that small shares can be distinguished.
+    // The scale ends at the largest share but not below 5 % or above 100 %, so that small shares can be distinguished.
     let full = all.fold(0.0, f64::max).clamp(5.0, 100.0);
     Figure::Bars(Bars { title: "Left unexplained".into(), unit: "%".into(), keys, groups, full })
 }

@@ -1,11 +1,13 @@
-//! Sentence for the answer box on where the tuned model fails.
+//! A sentence for the answer box of a diagnosis. It names the force or moment (channel) in which the re-estimated ("tuned") model
+//! fails.
 
 use crate::kit::numbers::number;
 use greylag_sysid::compare::ChannelId;
 use greylag_sysid::diagnose::{Candidate, ChannelLeft, Diagnosis, Verdict};
 
-/// Sentence on the channel of each asserted effect, with the variable that shows the effect. Without an asserted effect, the
-/// sentence is on the channel with the largest share that is unexplained after tuning.
+/// The sentence. It names for each asserted effect (one that the model lacks according to the diagnosis) the channel, and the
+/// variable with which the residual of the channel varies. If no effect is asserted, or none has such a curve, it names the
+/// channel of which the tuned model leaves the largest share unexplained.
 pub(crate) fn of_diagnosis(d: &Diagnosis) -> String {
     let asserted: Vec<&Candidate> = d.effects.iter().filter(|c| c.asserted).collect();
     let places: Vec<String> = asserted.iter().filter_map(|c| of_effect(d, c)).collect();
@@ -31,7 +33,8 @@ pub(crate) fn of_diagnosis(d: &Diagnosis) -> String {
     }
 }
 
-/// Text such as "pitching moment, with elevator movement (tuned 28 % unexplained, with backlash 0.3 %)".
+/// Text on the asserted effect `c`, such as "pitching moment, with elevator movement (tuned 28 % unexplained, with backlash
+/// 0.3 %)". `None` if the effect has no curve.
 fn of_effect(d: &Diagnosis, c: &Candidate) -> Option<String> {
     let curve = c.curve.as_ref()?;
     let mut text = format!("{}, with {}", name(&curve.channel), plain(&curve.variable));
@@ -44,13 +47,13 @@ fn of_effect(d: &Diagnosis, c: &Candidate) -> Option<String> {
     Some(text)
 }
 
-/// A channel's name without its symbol.
+/// The name in words of the channel with this `symbol`; `symbol` itself if there is none.
 fn name(symbol: &str) -> &str {
     let id = ChannelId::ALL.into_iter().find(|id| id.symbol() == symbol);
     id.map_or(symbol, |id| id.name())
 }
 
-/// A variable without its unit, which is the last word if that word contains `°` or `/` or is a single letter.
+/// The name of a variable without its unit. The last word is a unit if it contains `°` or `/` or is a single letter.
 pub(crate) fn plain(variable: &str) -> &str {
     match variable.rsplit_once(' ') {
         Some((words, unit)) if unit.contains(['°', '/']) || unit.len() == 1 => words,

@@ -1,4 +1,5 @@
-//! Evidence for a diagnosis: the level that chance reaches, and the error on held-out flights.
+//! Support for a diagnosis: the evidence that arises by chance, and the error on held-out flights, which no fit has used.
+//! Evidence is the test statistic of a candidate effect.
 
 use crate::Align::{Left, Right};
 use crate::comparison::page::{growth, unexplained};
@@ -8,12 +9,11 @@ use crate::{Figure, Finding, Findings, Histogram, Rule, Section, Table};
 use greylag_sysid::compare::{Comparison, ModelResult};
 use greylag_sysid::diagnose::Diagnosis;
 
-/// Smallest evidence that the histogram shows. Smaller values of the surrogate data would stretch its logarithmic
-/// axis.
+/// Smallest evidence that the histogram shows. Smaller values would stretch its logarithmic axis.
 const DRAWN: f64 = 0.1;
 /// Number of decoys (placebo regressors) in the table, in order of decreasing evidence.
 const DECOYS: usize = 8;
-/// Preferred horizon for the error in the sentence, s; without it, the last horizon is used.
+/// Preferred horizon for the error in the sentence, s. If the comparison does not have it, the last horizon is used.
 const SHOWN_S: f64 = 5.0;
 
 /// Section on the evidence that arises by chance: in surrogate flights without a missing effect (nulls), and for
@@ -79,14 +79,16 @@ fn decoys(d: &Diagnosis) -> Table {
     table
 }
 
-/// [`before_and_after`] with a sentence on the reduction of the error, for a page whose answer is about other flights.
+/// The section [`before_and_after`], preceded by a sentence on the change of the error, for a page whose answer is about other
+/// flights.
 pub(crate) fn stated(c: &Comparison) -> Section {
     let mut section = before_and_after(c);
     section.figures.insert(0, Figure::Findings(statement(c)));
     section
 }
 
-/// Section with free runs and unexplained shares of each model on flights that no fit has used.
+/// Section with the errors of free runs (open-loop simulations) and the unexplained shares of each model, on flights that
+/// no fit has used.
 pub(crate) fn before_and_after(c: &Comparison) -> Section {
     let mut figures = growth(c);
     figures.push(unexplained(c));
@@ -101,7 +103,7 @@ pub(crate) fn before_and_after(c: &Comparison) -> Section {
     Section::new("Before and after", &note, figures)
 }
 
-/// Sentence on the change of the error from the last model but one (tuned) to the last.
+/// Sentence on the change of the free-run error from the last model but one to the last, and the error of each model.
 fn statement(c: &Comparison) -> Findings {
     let horizons = || c.settings.horizons_s.iter().copied();
     let shown = horizons().find(|h| *h == SHOWN_S).or(horizons().next_back()).unwrap_or(SHOWN_S);

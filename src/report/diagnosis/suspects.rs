@@ -1,4 +1,6 @@
-//! Candidate effects of a diagnosis: evidence, curves, and agreement between flights.
+//! The figures about the candidate effects of a diagnosis: their evidence, their curves, and the agreement between flights. A
+//! candidate is an effect that the model may lack. Its evidence is a test statistic, which is compared with a threshold. It is
+//! asserted if the diagnosis concludes that the model lacks it.
 
 use crate::Align::{Left, Right};
 use crate::diagnosis::page::channel_of;
@@ -10,13 +12,13 @@ use crate::{
 };
 use greylag_sysid::diagnose::{Candidate, Curve, Diagnosis, Parameter};
 
-/// Anchor of the figure, for links from sentences about an effect.
+/// Anchor of the figure in the page, for links to it.
 pub(crate) const ANCHOR: &str = "effect";
-/// Number of candidates below their thresholds in the figure; the table contains all candidates.
+/// Largest number of candidates with evidence below the threshold in the figure. The table has all candidates.
 const BELOW: usize = 8;
-/// Number of candidates that are not asserted but whose curves are drawn.
+/// Largest number of candidates whose curves are drawn although they are not asserted.
 const CURVES: usize = 3;
-/// Largest number of measured points in a plot.
+/// Number of measured points above which a plot leaves out some of them.
 const POINTS: usize = 1500;
 
 pub(crate) fn ranking(d: &Diagnosis) -> Section {
@@ -60,7 +62,7 @@ pub(crate) fn ranking(d: &Diagnosis) -> Section {
     Section::new("Suspects", note, vec![Figure::Evidence(figure)])
 }
 
-/// An asserted effect and the effects that the data cannot distinguish from it.
+/// The rows of the asserted effect `found` and of the effects that the data cannot distinguish from it. Adds their ids to `seen`.
 fn tied<'a>(d: &'a Diagnosis, found: &'a Candidate, seen: &mut Vec<&'a str>) -> EvidenceGroup {
     let alike = |c: &&Candidate| found.indistinguishable_from.contains(&c.id);
     let others: Vec<&Candidate> = d.effects.iter().filter(alike).collect();
@@ -121,7 +123,7 @@ pub(crate) fn curves(d: &Diagnosis) -> Section {
          95 % interval.{beside}"
     );
     let choice = Choice { anchor: ANCHOR.into(), label: "Effect".into(), options };
-    // curves of candidates that are not asserted must not appear to be findings
+    // the title must not present candidates that are not asserted as findings
     let title = match d.effects.iter().any(|c| c.asserted) {
         true => "The effect",
         false => "The nearest suspects, none of them shown",
@@ -200,8 +202,8 @@ fn by_flight(c: &Candidate, p: &Parameter) -> Whiskers {
     flight_by_flight(title, &p.unit, flights, (p.value, p.ci95))
 }
 
-/// Root mean square distance of estimates from their weighted mean, in their standard deviations. `flights` holds estimates and
-/// standard deviations. 0 if fewer than two of them are finite.
+/// Root mean square of the distances of the flights' estimates from their weighted mean, each in units of its standard deviation.
+/// `flights` has an estimate and its standard deviation for each flight. 0 if fewer than two are finite.
 pub(crate) fn disagreement(flights: impl Iterator<Item = [f64; 2]>) -> f64 {
     let known: Vec<[f64; 2]> =
         flights.filter(|[value, sd]| value.is_finite() && sd.is_finite() && *sd > 0.0).collect();
@@ -214,8 +216,8 @@ pub(crate) fn disagreement(flights: impl Iterator<Item = [f64; 2]>) -> f64 {
     (square / (known.len() - 1) as f64).sqrt()
 }
 
-/// Estimates of a coefficient from each flight (flight, value, standard deviation), then the estimate from all flights together
-/// (value with its 95 % interval).
+/// A figure with the estimates of a coefficient from each flight alone (flight, value, standard deviation). Its last row is the
+/// estimate from all flights together (value with its 95 % interval).
 pub(crate) fn flight_by_flight<'a>(
     title: String,
     unit: &str,
@@ -255,7 +257,7 @@ mod tests {
         let of = |all: &[[f64; 2]]| disagreement(all.iter().copied());
         assert_eq!(of(&[[1.0, 0.1]]), 0.0);
         assert_eq!(of(&[[1.0, 0.1], [f64::NAN, 0.1], [2.0, 0.0]]), 0.0);
-        // a distance of 0.5 from the mean on both sides: √(2 × 25)
+        // both estimates lie 0.5 from the mean, which is 5 standard deviations: √(2 × 25)
         assert!((of(&[[1.0, 0.1], [2.0, 0.1]]) - 50f64.sqrt()).abs() < 1e-9);
         assert!(of(&[[1.0, 0.5], [1.2, 0.5]]) < 1.0);
     }

@@ -1,4 +1,5 @@
-//! Tables of a diagnosis: advice, detection limits, coefficients, sensors, trims, candidates, notes, provenance.
+//! Tables of a diagnosis: advice, detection limits, coefficients, sensors, trims, candidates, notes, provenance. A diagnosis
+//! tests which effects of the catalogue a model lacks, and asserts those with enough evidence.
 
 use std::path::Path;
 
@@ -34,7 +35,7 @@ pub(crate) fn advice(report: &DiagnosisReport) -> Section {
     Section::new("What to fly next", "The most useful first.", vec![figure])
 }
 
-/// Detection limits of the effects that are not asserted: the smallest value at which the data would have shown each effect.
+/// Detection limits: for each effect that is not asserted, the smallest value that the flights would have shown.
 pub(crate) fn unseen(d: &Diagnosis) -> Section {
     let columns = [("Effect", Left), ("Not seen below", Right), ("of", Left), ("What it is", Left)];
     let mut table = Table::new("What could not have been seen", &columns);
@@ -52,7 +53,8 @@ pub(crate) fn unseen(d: &Diagnosis) -> Section {
     section("What could not have been seen", note, table)
 }
 
-/// The tuned coefficients and their priors, in order of decreasing change relative to the prior's standard deviation.
+/// The re-estimated coefficients of the model with their values in the model file (priors). The largest changes, in standard
+/// deviations of the prior, come first.
 pub(crate) fn tuned(tuned: &[Tuned]) -> Section {
     if tuned.is_empty() {
         return Section::default();
@@ -126,7 +128,7 @@ pub(crate) fn measurement(d: &Diagnosis) -> Section {
     section("Sensors and wind", note, table)
 }
 
-/// Trim constants of each flight; empty if the diagnosis did not estimate them.
+/// The trim constants that were estimated for each flight; an empty section if there are none.
 pub(crate) fn trims(d: &Diagnosis) -> Section {
     let columns = [
         ("Flight", Left),
@@ -229,7 +231,7 @@ pub(crate) fn provenance(report: &DiagnosisReport) -> Section {
     Section::new("Provenance", "", vec![Figure::Table(table)])
 }
 
-/// A section with one table; an empty section if the table has no rows.
+/// A section with one table. If the table has no rows, the section is empty.
 fn section(title: &str, note: &str, table: Table) -> Section {
     match table.rows.is_empty() {
         true => Section::default(),

@@ -1,29 +1,33 @@
-//! Sentences of an evaluation's answer: ranking inside the envelope, envelope violations, lost targets, weakest group.
+//! Sentences that answer which controller is best in an evaluation: the ranking, the envelope, lost targets, and the weakest
+//! group of targets.
+//!
+//! Controllers are ranked by the settled error, which is the attitude error that remains at the end of a flight to a target. A
+//! flight keeps the envelope if load factor and angle of attack stay within their limits.
 
 use super::label;
 use crate::kit::numbers::number;
 use greylag_sim::evaluation::{Evaluation, Score};
 
-/// Group over which controllers are ranked if the evaluation contains it.
+/// Group of targets over which controllers are ranked if the evaluation contains it.
 const ALL: &str = "all";
-/// A controller ranks behind the others if its share of flights within the envelope is below the largest share by
-/// more than this: one flight in twenty. A small settled error does not compensate for a load factor beyond the
-/// limit.
+/// A controller ranks behind the others if its fraction of flights that keep the envelope is more than this below the largest
+/// one: one flight in twenty. A small settled error does not compensate for a load factor beyond the limit.
 const KEPT_APART: f64 = 0.05;
 
-/// The evaluation that ranks first; `None` if there are no scores.
+/// The evaluation of the controller that ranks first; `None` if there are no scores.
 pub fn best(evaluations: &[Evaluation]) -> Option<&Evaluation> {
     let [keeping, _] = ranked(evaluations, &ranked_over(evaluations)?);
     keeping.first().map(|(e, _)| *e)
 }
 
-/// Evaluations with their scores over `group`, sorted by settled error: first those that keep the envelope, then the others.
+/// Evaluations with their scores over `group`. The first list has the controllers that keep the envelope often enough, the
+/// second the others. Each list is sorted by the mean settled error.
 fn ranked<'a>(evaluations: &'a [Evaluation], group: &str) -> [Vec<(&'a Evaluation, &'a Score)>; 2] {
     let mut all: Vec<(&Evaluation, &Score)> =
         evaluations.iter().filter_map(|e| Some((e, e.score(group)?))).collect();
     all.sort_by(|(_, a), (_, b)| a.mean_deg.total_cmp(&b.mean_deg));
     let most = all.iter().map(|(_, s)| s.kept_rate).fold(f64::NAN, f64::max);
-    // without envelope measurements the share is NaN and does not affect the ranking
+    // without quality measures this fraction is NaN and does not affect the ranking
     let (leaving, keeping) = all.into_iter().partition(|(_, s)| s.kept_rate < most - KEPT_APART);
     [keeping, leaving]
 }
@@ -103,7 +107,8 @@ fn each(ranked: &[(&Evaluation, &Score)], of: impl Fn(&Score) -> String) -> Stri
     said.join(", ")
 }
 
-/// Sentence on the largest error of the best controller, with its group if there are several; `None` if there is no group.
+/// Sentence on the largest error of the best controller, with the group of the target if there are several groups. `None` if
+/// there is no group besides `all`.
 fn weakest(best: &Evaluation) -> Option<String> {
     let groups = || best.groups.iter().filter(|s| s.targets != ALL);
     let worst = groups().max_by(|a, b| a.max_deg.total_cmp(&b.max_deg))?;

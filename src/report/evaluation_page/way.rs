@@ -1,4 +1,6 @@
-//! Sections on the transients of an evaluation: error against surface travel, all measures, and their definitions.
+//! Sections of the evaluation page on the transient response to a commanded attitude (target): a plot of the error against the
+//! surface travel, a table of all measures, and their definitions. Surface travel is the sum of the magnitudes of all changes of
+//! the surface commands.
 
 use super::{EvaluationReport, Left, Right, label, with_interval};
 use crate::kit::numbers::number;
@@ -7,7 +9,7 @@ use greylag_control::quality::{MEASURES, Measure};
 use greylag_sim::evaluation::{Evaluation, Score};
 use greylag_sim::summary::Spread;
 
-/// Number of controllers with distinct colours; further controllers repeat the colours with wide lines.
+/// Number of distinct colours. Further controllers repeat the colours with wider lines.
 const COLOURS: usize = 4;
 
 /// The sections on transients; empty if the evaluation has no transient measures.
@@ -24,7 +26,7 @@ fn by_group(report: &EvaluationReport, anchor: &str, figure: &dyn Fn(&str) -> Fi
     let option =
         |group: &str| ChoiceOption { name: group.replace('_', " "), figures: vec![figure(group)] };
     let groups = report.groups();
-    // the group of the whole Table II comes first, then its parts
+    // the group "all" (the targets of the paper's Table II) comes first, then the other groups
     let (all, parts): (Vec<&str>, Vec<&str>) = groups.into_iter().partition(|g| *g == "all");
     Figure::Choice(Choice {
         anchor: anchor.into(),
@@ -33,7 +35,7 @@ fn by_group(report: &EvaluationReport, anchor: &str, figure: &dyn Fn(&str) -> Fi
     })
 }
 
-/// Plot with one cross per controller: integral of the error against surface travel.
+/// Plot of the integral of the attitude error against the surface travel, with one cross per controller.
 fn picture(report: &EvaluationReport) -> Section {
     let figure = |group: &str| {
         let crosses = report.evaluations.iter().enumerate().filter_map(|(k, e)| {
@@ -109,7 +111,7 @@ fn push(
     table.push(std::iter::once(title).chain(cells).collect::<Vec<_>>());
 }
 
-/// Whether a measure is nonzero for any controller; rudder measures are zero for an aircraft without a rudder.
+/// Whether a measure is nonzero for any controller. Without a rudder, for example, the measures of the rudder are zero.
 fn moves(scored: &[(&Evaluation, &Score)], m: &Measure) -> bool {
     scored.iter().any(|(_, score)| score.measures.get(m.id).is_some_and(|s| s.worst != 0.0))
 }
@@ -128,7 +130,7 @@ fn titled(m: &Measure) -> String {
     format!("{first}{}{unit}", letters.as_str())
 }
 
-/// Text on the limits that the evaluation applies.
+/// Text with the limits of the airframe file that the measures refer to; empty if the evaluation has none.
 fn limits(report: &EvaluationReport) -> String {
     let Some(limits) = report.evaluations.iter().find_map(|e| e.limits) else {
         return String::new();

@@ -32,7 +32,7 @@ pub struct FlightReport<'a> {
     pub segments: Vec<Segment>,
     /// Largest settled error that counts as tracked, rad.
     pub tolerance_rad: f64,
-    /// The envelope with which the flight is compared; `None` if the aircraft's limits are not known.
+    /// The envelope against which the flight is checked; `None` if the aircraft's limits are not known.
     pub envelope: Option<EnvelopeFlown>,
     /// Deflections at full command, by which the plots convert commands to deflections.
     pub travel: SurfaceTravel,
@@ -48,7 +48,7 @@ pub struct FlightReport<'a> {
     pub next: String,
 }
 
-/// Flight envelope with which a flight is compared, and the airspeed at which flight begins.
+/// Flight envelope against which a flight is checked, and the airspeed from which a sample counts as flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnvelopeFlown {
     /// The limits of the aircraft.
@@ -69,15 +69,15 @@ pub struct SurfaceTravel {
 /// A part of the schedule with a constant target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
-    /// Start of the target, s, on the flight's clock.
+    /// Time from which the target is commanded, s, on the flight's clock.
     pub start_s: f64,
-    /// End of the target, s, on the flight's clock.
+    /// Time up to which the target is commanded, s, on the flight's clock.
     pub end_s: f64,
     /// Commanded roll angle, rad.
     pub roll_target_rad: f64,
     /// Commanded pitch angle, rad.
     pub pitch_target_rad: f64,
-    /// Group of the target, by its difference from level flight.
+    /// Group of the target, by its distance from level flight.
     pub difficulty: Difficulty,
     /// Settled error, rad: mean of the roll and pitch RMS errors over the last fifth of the segment. NaN if it could not be
     /// determined.
@@ -91,7 +91,7 @@ impl Segment {
     }
 }
 
-/// Difference of a target from level flight, in the groups of the evaluation.
+/// Group of a target by its distance from level flight, as in `greylag evaluate`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Difficulty {
     /// |roll| below 45° and |pitch| below 25°.

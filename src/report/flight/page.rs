@@ -1,4 +1,4 @@
-//! Page of one flight: verdict, attitude, air data, surfaces, loop timing, targets and events.
+//! The HTML page of one flight: verdict, attitude, air data, surfaces, loop timing, targets and events.
 
 use crate::comparison;
 use crate::flight::FlightReport;
@@ -12,9 +12,9 @@ use greylag_control::Target;
 use greylag_control::quality::attitude_error_deg;
 use greylag_logs::Sample;
 
-/// Gap above which the lines are interrupted, s; the flight-log format splits a flight at the same gap.
+/// Time without samples above which the lines are interrupted, s. The flight-log format splits a flight at the same gap.
 const GAP_S: f64 = 0.1;
-/// Largest number of events that are marked in the plots; more marks would hide the lines.
+/// Largest number of events at which the plots have marks. With more events there are none, because they would hide the lines.
 const MARKED_EVENTS: usize = 40;
 
 pub(crate) fn page(report: &FlightReport) -> Page {
@@ -53,7 +53,7 @@ fn column(report: &FlightReport, value: impl Fn(&Sample) -> f64) -> Vec<f64> {
     report.flight.samples.iter().map(value).collect()
 }
 
-/// Panels over the samples of the log, with marks at the events.
+/// A figure of `panels` over the time of the log, with numbered marks at the events.
 fn time_figure(report: &FlightReport, panels: Vec<Panel>) -> TimeFigure {
     let mut figure = TimeFigure { marks: marks(report), ..TimeFigure::default() };
     figure.add_track(&column(report, |s| s.time_s), GAP_S, panels);
@@ -68,7 +68,7 @@ fn marks(report: &FlightReport) -> Vec<Mark> {
     timed.map(|(i, e)| Mark { time_s: e.time_s, label: (i + 1).to_string() }).collect()
 }
 
-/// Sentence of a note that explains the numbered marks; empty without marks.
+/// A sentence that explains the numbered marks; empty without marks.
 fn marked(report: &FlightReport) -> &'static str {
     match report.events.len() {
         1..=MARKED_EVENTS => " The numbers above the plots are the events listed at the end.",
@@ -131,7 +131,7 @@ fn angle_panel(title: &str, tolerance_rad: f64, (actual, command): &(Vec<f64>, V
 }
 
 fn error_panel(title: &str, tolerance_rad: f64, (actual, command): &(Vec<f64>, Vec<f64>)) -> Panel {
-    // wrapped to ±180°, as in the settled error: an inverted aircraft passes through the jump of the roll angle
+    // the error is wrapped to ±180°, because the roll angle jumps by 360° when an inverted aircraft passes 180°
     let size = |(a, c): (&f64, &f64)| {
         let target = Target { roll: *c, pitch: 0.0, airspeed: f64::NAN };
         attitude_error_deg([*a, 0.0], &target)[0].abs()
@@ -139,7 +139,7 @@ fn error_panel(title: &str, tolerance_rad: f64, (actual, command): &(Vec<f64>, V
     let error = actual.iter().zip(command).map(size).collect();
     let tolerance = tolerance_rad.to_degrees();
     Panel {
-        // The scale begins two decades below the tolerance, because smaller errors are irrelevant.
+        // the scale begins two decades below the tolerance, because smaller errors are irrelevant
         scale: Scale::Log { floor: positive_or(tolerance / 100.0, 1e-3) },
         rules: vec![Rule { value: tolerance, label: "tolerance".into() }],
         ..Panel::new(title, "°", vec![Series::new("error", Style::Actual, error)])
@@ -174,7 +174,7 @@ fn air_data(report: &FlightReport) -> Section {
 fn surfaces(report: &FlightReport) -> Section {
     let pair = |title: &str, unit: &str, acting: Vec<f64>, command: Vec<f64>| {
         let series = vec![
-            // The acting deflection stays close to its command; drawn in this order, both lines are visible.
+            // the two lines lie close together: in this order the actual one is drawn over the commanded one
             Series::new("commanded", Style::Command, command),
             Series::new("acting", Style::Actual, acting),
         ];

@@ -1,4 +1,4 @@
-//! Transients to the targets of a recorded flight, and time outside the envelope.
+//! Measures of the transient responses to the target attitudes of a recorded flight, and of the time outside the envelope.
 
 use crate::flight::verdict::signed;
 use crate::flight::{EnvelopeFlown, FlightReport, Segment};
@@ -10,21 +10,21 @@ use greylag_logs::Sample;
 use greylag_physics::Command;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 
-/// Gap above which a flight is split, s.
+/// Gap between samples above which a flight is split into parts, s.
 const GAP_S: f64 = 0.1;
 
 /// Envelope measures of a whole flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Kept {
-    /// Smallest and largest load factor, in units of standard gravity; NaN if not measured.
+    /// Smallest and largest load factor; NaN if not measured.
     pub load_factor: [f64; 2],
     /// Largest angle of attack, degrees.
     pub alpha_deg: f64,
     /// Time outside each limit, s.
     pub outside_s: OutsideS,
-    /// Whether any sample counts as flight; without one, nothing was compared with the limits.
+    /// Whether any part of the flight was compared with the limits.
     pub judged: bool,
-    /// Whether load factor and angle of attack exceeded their limits by at most 5 % (`quality::TRANSIENT`).
+    /// Whether load factor and angle of attack stayed within their limits plus 5 % (`quality::TRANSIENT`).
     pub kept: bool,
 }
 
@@ -46,7 +46,7 @@ fn moment(s: &Sample) -> Moment {
     }
 }
 
-/// Measures of the transient in `segment`.
+/// Measures of the transient response in `segment`, the part of the flight with one target.
 pub(super) fn of_segment(samples: &[Sample], segment: &Segment, limits: &Limits) -> Quality {
     let first = samples.partition_point(|s| s.time_s < segment.start_s);
     let end = samples.partition_point(|s| s.time_s <= segment.end_s).max(first);
@@ -58,7 +58,7 @@ pub(super) fn of_segment(samples: &[Sample], segment: &Segment, limits: &Limits)
     Track { moments, target, before, lost_s: 0.0 }.quality(limits)
 }
 
-/// Measures of the whole flight, over the samples whose airspeed is unknown or at least `flying_from_mps`.
+/// Envelope measures of the whole flight. Samples with a known airspeed below `flying_from_mps` are left out.
 pub(crate) fn kept(samples: &[Sample], envelope: &EnvelopeFlown) -> Kept {
     let flying = |s: &Sample| s.airspeed_mps.is_nan() || s.airspeed_mps >= envelope.flying_from_mps;
     let together = |a: &Sample, b: &Sample| flying(a) && flying(b) && b.time_s - a.time_s <= GAP_S;
@@ -85,7 +85,7 @@ pub(crate) fn kept(samples: &[Sample], envelope: &EnvelopeFlown) -> Kept {
     all
 }
 
-/// Part of a sentence on the time outside the envelope.
+/// Part of a sentence that states the time outside the envelope, the load factors and the largest angle of attack.
 pub(super) fn clause(kept: &Kept, limits: &Limits) -> String {
     let of = |value: f64, limit: f64, unit: &str| {
         let stated =
@@ -111,12 +111,12 @@ pub(super) fn clause(kept: &Kept, limits: &Limits) -> String {
     format!("{outside}: {load}, {alpha}")
 }
 
-/// The largest value of a measure over the segments; NaN if there is none.
+/// The largest value of the measure `of` over the segments; NaN if there is none.
 pub(super) fn most(qualities: &[Quality], of: impl Fn(&Quality) -> f64) -> f64 {
     qualities.iter().map(of).fold(f64::NAN, f64::max)
 }
 
-/// The section on the transients to the targets; `None` if there are no targets or no limits.
+/// The section on the transient responses to the targets; `None` if there are no targets or no limits.
 pub(crate) fn section(report: &FlightReport) -> Option<Section> {
     let qualities = report.qualities().filter(|all| !all.is_empty())?;
     let limits = report.envelope?.limits;

@@ -1,4 +1,5 @@
-//! Section on the targets of a flight: settled error of each target, and the path in roll and pitch.
+//! Section on the targets (commanded attitudes) of a flight: the path in roll and pitch, and the settled error of each target,
+//! which is the RMS error in the last fifth of its time.
 
 use crate::flight::FlightReport;
 use crate::flight::verdict::signed;

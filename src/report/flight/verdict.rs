@@ -1,4 +1,5 @@
-//! The verdict on a flight: one sentence and the measurements that it is based on.
+//! The verdict on a flight: one sentence and the measurements that it is based on. A segment is the part of the flight with one
+//! target.
 
 use crate::flight::quality::{clause, kept, most};
 use crate::flight::{Difficulty, FlightReport, Segment};
@@ -19,7 +20,7 @@ pub(crate) fn duration_s(samples: &[Sample]) -> f64 {
     }
 }
 
-/// Parts of the verdict: those of its main sentence, and further measurements.
+/// Parts of the verdict: the clauses of its main sentence, and further measurements.
 struct Parts {
     first: Vec<String>,
     beside: Vec<String>,
@@ -59,7 +60,7 @@ impl Parts {
     }
 }
 
-/// The verdict in one line, with all parts.
+/// The verdict as one line that contains all parts.
 pub(crate) fn sentence(report: &FlightReport) -> String {
     let Parts { first, beside } = Parts::of(report);
     format!("{}.", first.into_iter().chain(beside).collect::<Vec<_>>().join("; "))
@@ -111,8 +112,8 @@ fn capital(text: &str) -> String {
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// Text on the largest integral of error, with its target, and on the largest overshoot over the segments; `None` without
-/// segments or limits.
+/// Text on the largest error integral with its target, and on the largest overshoot of all segments; `None` without segments or
+/// limits.
 fn on_the_way(report: &FlightReport) -> Option<String> {
     let qualities = report.qualities().filter(|all| !all.is_empty())?;
     let integral = most(&qualities, |q| q.error_integral_deg_s);
@@ -153,7 +154,7 @@ fn details(report: &FlightReport) -> Vec<String> {
             100.0 * TRANSIENT
         ));
     }
-    // with an envelope, the measurements already contain the latency
+    // with an envelope, the latency is already part of the verdict
     if let Some(timing) = report.timed().filter(|_| report.envelope.is_none()) {
         let [p50, p99, p999] = timing.percentiles_us([0.5, 0.99, 0.999]).map(|us| us / 1e3);
         details.push(format!(
@@ -165,7 +166,7 @@ fn details(report: &FlightReport) -> Vec<String> {
     details
 }
 
-/// One line for each missed target, up to `LISTED_TARGETS`, and one line on the number of the others.
+/// One line for each of the first `LISTED_TARGETS` missed targets, and one line with the number of the others.
 fn not_tracked(report: &FlightReport) -> Vec<String> {
     let missed = || {
         let numbered = report.segments.iter().zip(1..);
@@ -191,7 +192,7 @@ pub(crate) fn signed(rad: f64) -> String {
     format!("{:+.1}", rad.to_degrees()).replace('-', "−")
 }
 
-/// An error in degrees, with enough decimals that a small error is not shown as zero.
+/// An error in degrees. The number of decimals is such that a small error is not shown as zero.
 pub(crate) fn degrees(rad: f64) -> String {
     let deg = rad.to_degrees();
     match deg.abs() {

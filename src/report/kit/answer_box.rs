@@ -1,4 +1,5 @@
-//! Box with the answer of a page: main sentences, where the model fails, the remaining error, the next command.
+//! Box with the answer of a page on a model's error in free runs (open-loop simulations): how the error changes, which effects
+//! are missing, where the model fails, and the next command.
 
 use crate::kit::figure::next_command;
 use crate::kit::html::escape;
@@ -24,8 +25,8 @@ pub struct AnswerBox {
 pub enum First {
     /// The change of the error.
     Error,
-    /// The sentence on missing effects. It comes first if no effect is missing, because a smaller error then comes
-    /// from re-estimation alone.
+    /// The sentence on missing effects. It comes first if no effect is missing: the error then falls only because the
+    /// coefficients were re-estimated.
     Effect,
 }
 
@@ -52,7 +53,7 @@ impl AnswerBox {
         )
     }
 
-    /// CSS class for the colour of the box; empty if the error falls.
+    /// CSS class for the colour of the box. It is empty if the sentence on the error comes first and the error falls.
     fn tone(&self) -> &'static str {
         let change = self.answer.numbers.change_percent;
         match self.first {

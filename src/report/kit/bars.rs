@@ -1,4 +1,4 @@
-//! Horizontal bars: one quantity for several items, with adjacent bars for several models.
+//! Bar chart: one quantity for several items, with horizontal bars. Each item has one bar per model, below each other.
 
 use crate::Style;
 use crate::kit::html::escape;
@@ -10,15 +10,15 @@ pub struct Bars {
     pub title: String,
     /// Unit of the values, such as `%`.
     pub unit: String,
-    /// Names and styles of the bars in each group, in order.
+    /// Name and style of each bar of a group (for example, of each model), in order.
     pub keys: Vec<(String, Style)>,
     /// The groups, top to bottom.
     pub groups: Vec<BarGroup>,
-    /// Value of a bar of full length; the bar of a larger value is truncated and marked.
+    /// Value at which a bar has its full length. The bar of a larger value has full length too and a mark.
     pub full: f64,
 }
 
-/// Bars of one item, one per key.
+/// Bars of one item: one for each of [`Bars::keys`].
 #[derive(Clone, Debug)]
 pub struct BarGroup {
     /// Name of the item.
@@ -69,7 +69,7 @@ fn value_text(value: f64, unit: &str) -> String {
     }
 }
 
-/// Legend of the keys; empty for fewer than two keys.
+/// HTML of the legend for the keys; empty for fewer than two keys.
 pub(crate) fn keys_html(keys: &[(String, Style)]) -> String {
     if keys.len() < 2 {
         return String::new();
@@ -97,7 +97,7 @@ mod tests {
         let html = bars.html();
         let widths: Vec<&str> =
             html.split("width:").skip(1).map(|w| w.split('%').next().unwrap()).collect();
-        // The first value is cut at 100. NaN, negative and infinite values give no bar.
+        // the bar of 250 is cut off at 100; NaN, negative and infinite values give no bar
         assert_eq!(widths, ["100.00", "0.00", "0.00", "0.00"]);
         assert!(html.contains("250 %") && html.contains("cannot be determined"));
     }

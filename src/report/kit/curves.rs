@@ -1,4 +1,4 @@
-//! Curves of one quantity over another, with a logarithmic or linear vertical axis.
+//! A figure with curves of one quantity over another. The vertical axis is logarithmic or linear.
 
 use serde::Serialize;
 
@@ -19,9 +19,10 @@ pub struct Curves {
     /// Values on the horizontal axis, ascending.
     #[serde(serialize_with = "compact")]
     pub x: Vec<f64>,
-    /// The curves, each with one value per element of `x`. A value outside the domain of the scale leaves a gap.
+    /// The curves, each with one value per element of `x`. A value that the axis cannot show, such as 0 on a logarithmic one,
+    /// leaves a gap.
     pub series: Vec<Series>,
-    /// Shaded ranges around curves, such as the minimum and maximum over several seeds.
+    /// Shaded ranges around curves, such as from the minimum to the maximum over several seeds.
     pub ranges: Vec<Range>,
     /// Whether the vertical axis is linear instead of logarithmic.
     pub linear: bool,

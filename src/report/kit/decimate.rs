@@ -1,8 +1,9 @@
-//! Selects rows for plots: in time order, separated at gaps, thinned without loss of extremes.
+//! Selects rows of a log for plots. The rows are in time order and interrupted at gaps. Thinning keeps the extremes.
 
 use std::ops::Range;
 
-/// Indices of the rows whose times ascend, with `None` between two rows that are more than `gap_s`, s, apart.
+/// Indices of the rows. A row whose time is not later than that of the row before is left out. `None` stands for a gap,
+/// between two rows that are more than `gap_s` (s) apart.
 pub(crate) fn rows_in_order(time_s: &[f64], gap_s: f64) -> Vec<Option<usize>> {
     let mut rows = Vec::with_capacity(time_s.len());
     let mut last = f64::NEG_INFINITY;
@@ -19,7 +20,7 @@ pub(crate) fn rows_in_order(time_s: &[f64], gap_s: f64) -> Vec<Option<usize>> {
     rows
 }
 
-/// The times of `rows`, s; a gap gets the mean of its neighbours' times.
+/// The times of `rows`, s. The time of a gap is the mean of its neighbours' times.
 pub(crate) fn times_of(rows: &[Option<usize>], time_s: &[f64]) -> Vec<f64> {
     let at = |k: usize| rows.get(k).copied().flatten().map_or(f64::NAN, |i| time_s[i]);
     (0..rows.len())
@@ -30,13 +31,13 @@ pub(crate) fn times_of(rows: &[Option<usize>], time_s: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// The values of `rows`; NaN at a gap and beyond the end of `values`.
+/// The values of `rows`. A gap and a row beyond the end of `values` have the value NaN.
 pub(crate) fn values_of(rows: &[Option<usize>], values: &[f64]) -> Vec<f64> {
     rows.iter().map(|row| row.and_then(|i| values.get(i)).copied().unwrap_or(f64::NAN)).collect()
 }
 
-/// Consecutive groups of at most `size` rows, as ranges of positions in `rows`. The first gap of every `size` rows is a
-/// group of its own, so that it stays a gap in the thinned rows.
+/// Consecutive groups of at most `size` rows, as ranges of positions in `rows`. The first gap among every `size` rows is a
+/// group of its own, so that the thinned line is interrupted there.
 pub(crate) fn groups(rows: &[Option<usize>], size: usize) -> Vec<Range<usize>> {
     let mut groups = Vec::new();
     for (k, chunk) in rows.chunks(size).enumerate() {
@@ -53,7 +54,7 @@ pub(crate) fn groups(rows: &[Option<usize>], size: usize) -> Vec<Range<usize>> {
     groups
 }
 
-/// Two values for every group: the smallest and the largest, in their original order; NaN without finite values. A
+/// Two values for every group: the smallest and the largest, in their order in time. They are NaN if no value is finite. A
 /// group of a single row gives one value.
 pub(crate) fn extremes(values: &[f64], groups: &[Range<usize>]) -> Vec<f64> {
     let mut thin = Vec::with_capacity(2 * groups.len());
@@ -100,7 +101,7 @@ mod tests {
         assert_eq!(times_of(&rows, &time), [0.0, 0.01, 0.02, 0.52, 1.02]);
         let values = values_of(&rows, &[1.0, 2.0, 3.0, 4.0, 5.0]);
         assert_eq!(values[..3], [1.0, 2.0, 5.0]);
-        // The first is the gap; the second is the row beyond the end of `values`.
+        // Value 3 belongs to the gap, and value 4 to row 5, which is beyond the end of the values.
         assert!(values[3].is_nan() && values[4].is_nan());
     }
 

@@ -1,8 +1,8 @@
-//! A figure of SVG lines and areas, to scale.
+//! A figure of SVG lines and areas, drawn to scale.
 
 use crate::kit::html::escape;
 
-/// A drawing to scale; its elements have the classes `body`, `wing` and `surface`.
+/// A drawing to scale. Its SVG elements have the CSS classes `body`, `wing` and `surface`.
 #[derive(Clone, Debug)]
 pub struct Drawing {
     /// Title of the drawing.
@@ -11,7 +11,7 @@ pub struct Drawing {
     pub said: String,
     /// Width and height, in the unit of the drawing's coordinates.
     pub size: [f64; 2],
-    /// SVG elements of the drawing. It must not contain unescaped text of a user.
+    /// SVG elements of the drawing. They must not contain unescaped text of a user.
     pub svg: String,
 }
 

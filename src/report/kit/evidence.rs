@@ -1,13 +1,15 @@
-//! Evidence for candidate effects (test statistics): bars relative to the candidates' thresholds, in groups.
+//! Figure of the evidence for candidate effects, as bars relative to the candidates' thresholds, in groups.
+//!
+//! The evidence is the test statistic of a candidate. Its threshold is what a candidate reaches by chance, without the effect.
 
 use crate::Style;
 use crate::kit::html::escape;
 use crate::kit::numbers::evidence;
 
-/// Length of the longest bar, in thresholds; a longer bar is truncated and marked.
+/// Length of the longest bar, as a ratio of evidence to threshold. A longer bar is cut off and marked.
 const FULL: f64 = 6.0;
 
-/// Bars of evidence divided by threshold, with a vertical line at a ratio of 1.
+/// Bars of the ratio of evidence to threshold, with a vertical line at a ratio of 1.
 #[derive(Clone, Debug)]
 pub struct Evidence {
     /// Title of the figure.
@@ -29,7 +31,7 @@ pub struct EvidenceGroup {
     pub rows: Vec<EvidenceRow>,
 }
 
-/// One candidate: its evidence, and the threshold under the null hypothesis.
+/// One candidate with its evidence and its threshold.
 #[derive(Clone, Debug)]
 pub struct EvidenceRow {
     /// Name of the candidate.
@@ -38,19 +40,19 @@ pub struct EvidenceRow {
     pub detail: String,
     /// Evidence; NaN if it could not be determined.
     pub value: f64,
-    /// Threshold of the evidence under the null hypothesis; NaN if it is not known.
+    /// Threshold of the evidence; NaN if it is unknown.
     pub threshold: f64,
 }
 
 impl EvidenceRow {
-    /// Evidence divided by its threshold; NaN without a positive threshold.
+    /// Ratio of the evidence to its threshold; NaN without a positive threshold.
     fn ratio(&self) -> f64 {
         if self.threshold > 0.0 { self.value / self.threshold } else { f64::NAN }
     }
 }
 
 impl Evidence {
-    /// Length of the horizontal axis, in thresholds.
+    /// Length of the horizontal axis, as a ratio of evidence to threshold.
     fn full(&self) -> f64 {
         let ratios = self.groups.iter().flat_map(|g| &g.rows).map(EvidenceRow::ratio);
         let longest = ratios.filter(|r| r.is_finite()).fold(0.0, f64::max);
@@ -128,7 +130,7 @@ mod tests {
         let html = Evidence { title: "e".into(), groups: vec![group] }.html();
         let widths: Vec<&str> =
             html.split("width:").skip(1).map(|w| w.split('%').next().unwrap()).collect();
-        // Twelve thresholds are truncated at six. Half a threshold is a twelfth of six. The others give no bar.
+        // A ratio of 12 is cut off at 6. A ratio of 0.5 fills 0.5/6 = 8.33 % of the axis. The other rows have no bar.
         assert_eq!(widths, ["100.00", "8.33", "0.00", "0.00", "0.00", "0.00"]);
         assert!(html.contains("bar-fill cut") && html.contains("left:16.67%"));
         assert!(html.contains("5.0, chance 10.0") && html.contains("cannot be determined"));

@@ -1,4 +1,4 @@
-//! The types of figure in a section, with verdicts and line styles.
+//! The types of figures in a section of a page, and the styles of lines.
 
 use serde::Serialize;
 
@@ -15,33 +15,33 @@ pub enum Figure {
     Verdict(Verdict),
     /// The answer to the page's question.
     Answer(Box<AnswerBox>),
-    /// Lines and areas to scale.
+    /// A drawing of lines and areas, to scale.
     Drawing(Drawing),
     /// Panels of curves over time.
     Time(TimeFigure),
     /// Points or paths of one quantity against another.
     Xy(XyFigure),
-    /// Counts of one quantity.
+    /// A histogram of one quantity.
     Histogram(Histogram),
-    /// Text in rows and columns.
+    /// A table of texts in rows and columns.
     Table(Table),
     /// Findings, one sentence each.
     Findings(Findings),
     /// Alternative figures, of which one is visible at a time.
     Choice(Choice),
-    /// Curves of one quantity over another.
+    /// Curves of one quantity as a function of another.
     Curves(Curves),
-    /// Means in bins with their intervals.
+    /// Means of one quantity in bins of another, with their intervals.
     Intervals(Intervals),
-    /// A signed quantity over two other quantities.
+    /// Map of a signed quantity over two other quantities.
     HeatMap(HeatMap),
     /// Horizontal bars from zero.
     Bars(Bars),
-    /// Bars of evidence against thresholds.
+    /// Bars of evidence for effects, with thresholds.
     Evidence(Evidence),
     /// Values with their intervals.
     Whiskers(Whiskers),
-    /// A table coloured by weight.
+    /// A table of numbers whose cells are coloured by their weight.
     Grid(Grid),
 }
 
@@ -65,7 +65,7 @@ pub enum Outcome {
 pub struct Verdict {
     /// Outcome, shown as a word and by colour.
     pub outcome: Outcome,
-    /// The missed requirements, shown next to the outcome; empty if the sentence states them.
+    /// The requirements that were missed, shown next to the outcome; empty if the sentence states them.
     pub reason: String,
     /// The verdict as one sentence.
     pub sentence: String,
@@ -107,13 +107,13 @@ pub(crate) fn next_command(next: &str) -> String {
     }
 }
 
-/// Meaning of a line or point; the colours are distinguishable with colour blindness.
+/// Meaning of a line or point. The colours are distinguishable with colour blindness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Style {
     /// Commanded value: orange, dashed.
     Command,
-    /// Actual value: blue.
+    /// First actual value: blue.
     Actual,
     /// Second actual value: green.
     Second,

@@ -3,30 +3,30 @@
 use crate::kit::figure::next_command;
 use crate::kit::html::escape;
 
-/// A list of findings, of which the leading ones are prominent.
+/// A list of findings. Some of them are shown prominently.
 #[derive(Clone, Debug, Default)]
 pub struct Findings {
-    /// Prominent findings.
+    /// Prominent findings, which are shown first.
     pub lead: Vec<Finding>,
     /// Further findings, in order.
     pub rest: Vec<Finding>,
-    /// The next command for the user to run; empty if there is none.
+    /// The command that the user should run next; empty if there is none.
     pub next: String,
 }
 
-/// One finding, as a sentence.
+/// One finding in the form of a sentence.
 #[derive(Clone, Debug)]
 pub struct Finding {
     /// The sentence, including its full stop.
     pub sentence: String,
-    /// The figure with the evidence; `None` for a sentence without a link.
+    /// Link to the figure with the evidence; `None` if there is no link.
     pub link: Option<Link>,
 }
 
-/// A link to one alternative of a [`crate::Choice`].
+/// A link to one alternative of a [`crate::Choice`], a figure in which the reader selects one of several alternatives.
 #[derive(Clone, Debug)]
 pub struct Link {
-    /// Anchor of the choice.
+    /// HTML anchor of the choice.
     pub anchor: String,
     /// Name of the alternative.
     pub option: String,

@@ -1,8 +1,8 @@
-//! A table of numbers whose cells are shaded by weight.
+//! A table of numbers. Each cell is shaded with its own intensity.
 
 use crate::kit::html::escape;
 
-/// Table of numbers whose cells are shaded by weight.
+/// Table of numbers. Each cell is shaded with its own intensity.
 #[derive(Clone, Debug)]
 pub struct Grid {
     /// Title of the figure.
@@ -31,7 +31,7 @@ pub struct GridRow {
 pub struct GridCell {
     /// Text of the cell; may be empty.
     pub text: String,
-    /// Intensity of the colour, 0..1.
+    /// Intensity of the shading, 0..1.
     pub weight: f64,
 }
 

@@ -1,10 +1,10 @@
-//! A signed quantity over two other quantities, as coloured cells.
+//! A figure that shows a signed quantity over two other quantities by coloured cells.
 
 use serde::Serialize;
 
 use crate::kit::html::{compact, escape};
 
-/// Cells coloured from blue (negative) to orange (positive).
+/// A map of cells, coloured from blue (negative) to orange (positive).
 #[derive(Clone, Debug, Serialize)]
 pub struct HeatMap {
     /// Title of the figure.
@@ -45,7 +45,7 @@ pub struct HeatCell {
 }
 
 fn compact_one<S: serde::Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-    // Single precision exceeds the resolution of the colours.
+    // single precision is finer than the resolution of the colours
     match value.is_finite() {
         true => serializer.serialize_f32(*value as f32),
         false => serializer.serialize_none(),

@@ -8,7 +8,7 @@ use crate::kit::html::{compact, escape};
 /// Number of bins per decade.
 const BINS_PER_DECADE: f64 = 20.0;
 
-/// Counts in bins on two logarithmic axes, which keep rare large values visible.
+/// Counts in bins. Both axes are logarithmic, so that rare large values are visible.
 #[derive(Clone, Debug, Serialize)]
 pub struct Histogram {
     /// Title of the figure.
@@ -28,7 +28,8 @@ pub struct Histogram {
 }
 
 impl Histogram {
-    /// Counts the positive finite `values`, in the unit of `x_label`, in bins of equal ratio. The bins also cover `rules`.
+    /// Counts the positive finite `values` (in the unit of `x_label`) in bins of equal width on a logarithmic axis. The bins also
+    /// cover the marked values `rules`.
     pub fn log(
         title: &str,
         x_label: &str,

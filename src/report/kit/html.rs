@@ -9,8 +9,8 @@ use serde::{Serialize, Serializer};
 #[cfg(feature = "study")]
 const NAMED: usize = 6;
 
-/// `text` with the five special characters of HTML escaped and control characters replaced. The result is safe as element text
-/// and inside a quoted attribute.
+/// Escapes the five special characters of HTML in `text` and replaces control characters. The result is safe as the text of an
+/// element and inside a quoted attribute.
 pub fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
@@ -28,7 +28,8 @@ pub fn escape(text: &str) -> String {
     safe
 }
 
-/// File names without their folders, at most `NAMED` of them. The provenance lists the full paths.
+/// Lists the file names of `paths` without their folders, at most `NAMED` of them. A page's section on provenance has the full
+/// paths.
 #[cfg(feature = "study")]
 pub(crate) fn file_names(paths: &[String]) -> String {
     let name = |path: &String| {
@@ -41,7 +42,8 @@ pub(crate) fn file_names(paths: &[String]) -> String {
     names.join(", ")
 }
 
-/// `data` as JSON for a `<script>` element. It contains no `<`, so neither `</script>` nor `<!--` can end the element.
+/// Serialises `data` as JSON for a `<script>` element. The JSON contains no `<`, so neither `</script>` nor `<!--` can end the
+/// element.
 pub(crate) fn script_json<T: Serialize>(data: &T) -> String {
     serde_json::to_string(data)
         .expect("figures are structs of strings and numbers, which JSON can hold")

@@ -1,4 +1,5 @@
-//! Means in bins with their intervals: one small plot for each binned quantity.
+//! Mean of a quantity over bins of other quantities, with confidence intervals: one small plot for each of the other
+//! quantities.
 
 use serde::Serialize;
 
@@ -6,7 +7,7 @@ use crate::Style;
 use crate::kit::bars::keys_html;
 use crate::kit::html::{compact, escape};
 
-/// Small plots of binned means with a common vertical scale.
+/// Small plots with a common vertical scale. Each shows binned means over one quantity.
 #[derive(Clone, Debug, Serialize)]
 pub struct Intervals {
     /// Name of the vertical axis, with its unit.
@@ -15,18 +16,18 @@ pub struct Intervals {
     pub unit: String,
     /// Names and styles of the lines in every panel, in order.
     pub keys: Vec<(String, Style)>,
-    /// One panel per binned quantity.
+    /// One panel for each quantity on a horizontal axis.
     pub panels: Vec<IntervalPanel>,
 }
 
-/// Panel of one binned quantity.
+/// Panel with one quantity on its horizontal axis.
 #[derive(Clone, Debug, Serialize)]
 pub struct IntervalPanel {
-    /// Name of the binned quantity.
+    /// Name of the quantity on the horizontal axis.
     pub title: String,
-    /// Unit of the binned quantity; empty for a dimensionless quantity.
+    /// Unit of the quantity on the horizontal axis; empty if it is dimensionless.
     pub unit: String,
-    /// Names at the positions 0, 1, 2 … for bins that are not intervals; empty otherwise.
+    /// Names at the positions 0, 1, 2 … if the bins are names instead of intervals; empty otherwise.
     pub names: Vec<String>,
     /// The bins of each line, one element per key.
     pub lines: Vec<IntervalBins>,
@@ -35,10 +36,10 @@ pub struct IntervalPanel {
 /// The bins of one line; all lists have the same length.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct IntervalBins {
-    /// Lower edges, in the unit of the panel; NaN if open.
+    /// Lower edges of the bins, in the unit of the panel; NaN if a bin is open below.
     #[serde(serialize_with = "compact")]
     pub from: Vec<f64>,
-    /// Upper edges, in the unit of the panel; NaN if open.
+    /// Upper edges of the bins, in the unit of the panel; NaN if a bin is open above.
     #[serde(serialize_with = "compact")]
     pub to: Vec<f64>,
     /// Horizontal position of the mean, in the unit of the panel.
@@ -55,7 +56,7 @@ pub struct IntervalBins {
     pub high: Vec<f64>,
     /// Number of independent samples in each bin.
     pub samples: Vec<usize>,
-    /// Whether the samples are sufficient; otherwise the bin is drawn grey.
+    /// Whether each bin has enough samples. A bin with too few samples is drawn grey.
     pub supported: Vec<bool>,
 }
 

@@ -1,4 +1,4 @@
-//! Durations of the cycles of the control loop.
+//! Computing times of the cycles of the control loop.
 
 /// One cycle of the control loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,7 +14,7 @@ pub struct Cycle {
 pub struct LoopTiming {
     /// Name of the timed interval, such as "state frame to actuator command".
     pub measure: String,
-    /// Budget of a cycle, µs; a longer cycle is late.
+    /// Largest permitted duration of a cycle, µs. A longer cycle is late.
     pub budget_us: f64,
     /// The cycles, in time order.
     pub cycles: Vec<Cycle>,
@@ -53,7 +53,7 @@ mod tests {
 
     #[test]
     fn percentiles_are_nearest_ranks() {
-        // The values are 1 to 1000, so each value equals its rank.
+        // The durations are 1 to 1000, so each duration equals its rank.
         let timing = timing((1..=1000).rev().map(f64::from));
         assert_eq!(timing.percentiles_us([0.5, 0.99, 0.999, 1.0]), [500.0, 990.0, 999.0, 1000.0]);
         assert_eq!(timing.late(), 10);

@@ -1,4 +1,4 @@
-//! Figure kit: pages, tables and plots, independent of the subject of a report.
+//! Building blocks of all reports: HTML pages, tables and plots, which do not depend on the subject of a report.
 
 pub(super) mod answer_box;
 pub(super) mod bars;

@@ -3,7 +3,7 @@
 /// Half width of the 95 % interval of a normal distribution, in standard deviations.
 pub(crate) const NORMAL_95: f64 = 1.96;
 
-/// Three significant digits with a true minus sign; a dash for NaN and infinity.
+/// Formats a number with three significant digits and a true minus sign; a dash for NaN and infinity.
 pub(crate) fn number(value: f64) -> String {
     if !value.is_finite() {
         return "–".into();
@@ -17,7 +17,7 @@ pub(crate) fn number(value: f64) -> String {
     text.replace('-', "−")
 }
 
-/// Evidence with one decimal, or without decimals from 100 on; a dash for NaN and infinity.
+/// Formats evidence (a test statistic) with one decimal, without decimals from 100 on; a dash for NaN and infinity.
 pub(crate) fn evidence(value: f64) -> String {
     let text = match value {
         v if !v.is_finite() => return "–".into(),
@@ -28,7 +28,7 @@ pub(crate) fn evidence(value: f64) -> String {
     text.replace('-', "−")
 }
 
-/// A share in percent, rounded to an integer; a dash for NaN and infinity.
+/// Formats a share (0..1) in percent, rounded to an integer; a dash for NaN and infinity.
 pub(crate) fn percent(share: f64) -> String {
     if share.is_finite() {
         format!("{:.0}", 100.0 * share).replace('-', "−")

@@ -1,4 +1,4 @@
-//! A page: sections of figures that are rendered into one HTML file.
+//! A page of a report: sections with figures, which are rendered into one HTML file.
 
 use serde_json::Value;
 
@@ -9,14 +9,14 @@ const UPLOT_SCRIPT: &str = include_str!("assets/uPlot.iife.min.js");
 const UPLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
 const UPLOT_LICENCE: &str = include_str!("assets/uPlot.LICENSE");
 const STYLE: &str = include_str!("assets/page.css");
-/// Scripts that draw the figures. Each uses functions of the scripts before it, so all run in one scope.
+/// Scripts that draw the figures. Each uses functions of the scripts before it, so they are joined into one.
 const SCRIPTS: [&str; 4] = [
     include_str!("assets/draw.js"),
     include_str!("assets/link.js"),
     include_str!("assets/bins.js"),
     include_str!("assets/page.js"),
 ];
-/// Script that sets the theme before the page is drawn; otherwise a dark page would first appear white.
+/// Script that sets the light or dark theme before the page is drawn. Otherwise a dark page would first appear white.
 const THEME_SCRIPT: &str = include_str!("assets/theme.js");
 
 /// A page: a title and sections.
@@ -30,16 +30,16 @@ pub struct Page {
     pub sections: Vec<Section>,
 }
 
-/// Figures under a common heading.
+/// A section: figures under a common heading.
 #[derive(Clone, Debug, Default)]
 pub struct Section {
     /// The heading; empty for no heading.
     pub title: String,
-    /// One or two sentences under the heading on what the figures show and how it is defined.
+    /// One or two sentences under the heading, which state what the figures show and how it is defined.
     pub note: String,
     /// The figures, in order.
     pub figures: Vec<Figure>,
-    /// Whether the section is initially open. A section with plots must be, because a plot gets its size when it is drawn.
+    /// Whether the section is initially open. A section with plots must be open, because a plot takes its size when it is drawn.
     pub folding: Folding,
 }
 
@@ -114,7 +114,7 @@ impl Section {
         Section::new("", "", vec![Figure::Verdict(verdict)])
     }
 
-    /// The section as HTML. The data of its plots is appended to `data`, one JSON value per plot.
+    /// The section as HTML. Appends the data of its plots to `data`, with one JSON value per plot.
     fn html(&self, index: usize, data: &mut Vec<String>) -> String {
         let mut html = format!("<section id=\"s{index}\">\n");
         let heading = match (self.title.is_empty(), self.folding) {

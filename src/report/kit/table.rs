@@ -2,9 +2,9 @@
 
 use crate::kit::html::escape;
 
-/// Number of characters above which texts in the last column are wrapped.
+/// If a text in the last column has more characters than this, that column gets a larger minimum width.
 const LONG: usize = 28;
-/// Number of columns above which all cells are wrapped, to fit the table on a screen.
+/// If a table has more columns than this, the texts of all cells are wrapped, so that the table fits on a screen.
 const WIDE: usize = 9;
 
 /// A table of text with column heads.
@@ -30,9 +30,9 @@ pub struct Column {
 /// Alignment of a column's text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
-    /// Left, for words.
+    /// Text at the left, for words.
     Left,
-    /// Right, for numbers.
+    /// Text at the right, for numbers.
     Right,
 }
 
@@ -41,7 +41,8 @@ pub enum Align {
 pub struct Row {
     /// Text of the row's cells, one per column.
     pub cells: Vec<String>,
-    /// Start and end of the described time, s. If set, the first cell is a button that zooms the time figures to this time.
+    /// Start and end of the time that the row describes, s. If set, the first cell is a button that zooms the plots over time to
+    /// this interval.
     pub span_s: Option<[f64; 2]>,
     /// Anchor for links to this row; `None` for no anchor.
     pub anchor: Option<String>,

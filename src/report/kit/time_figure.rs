@@ -1,4 +1,4 @@
-//! Plots over time with a common zoom and cursor.
+//! Plots over time with a common zoom and cursor. Panels with the same sample times form a track.
 
 use serde::Serialize;
 
@@ -12,11 +12,11 @@ const DRAWN_ROWS: usize = 20_000;
 /// Panels over time; all time figures of a page have the same time axis.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct TimeFigure {
-    /// Groups of panels, one per set of sample times.
+    /// The tracks, one for each set of sample times.
     pub tracks: Vec<Track>,
     /// Times marked in every panel.
     pub marks: Vec<Mark>,
-    /// Notes under the panels on omitted or thinned data.
+    /// Notes under the panels about omitted or thinned data.
     #[serde(skip)]
     pub notes: Vec<String>,
 }
@@ -117,11 +117,11 @@ pub struct Mark {
 }
 
 impl TimeFigure {
-    /// Adds panels with the sample times `time_s`, s, which should ascend. Rows out of time order are omitted.
+    /// Adds a track of panels with the sample times `time_s`, s, which should ascend. Rows out of time order are omitted.
     ///
     /// Series without a finite value and panels without a series are omitted. A gap longer than `gap_s`, s, interrupts the lines.
-    /// More than 20,000 rows are thinned to the extremes of equal groups. The notes state what was omitted or thinned, except for
-    /// gaps.
+    /// More than 20,000 rows are thinned: the rows are divided into equal groups, and the extremes of each group are kept. The
+    /// notes state which data were omitted or thinned.
     pub fn add_track(&mut self, time_s: &[f64], gap_s: f64, panels: Vec<Panel>) {
         let mut panels = self.without_missing(panels);
         if panels.is_empty() {
@@ -162,7 +162,7 @@ impl TimeFigure {
                     panel.bands.retain(|b| b.around != i);
                 }
             }
-            // A band refers to its line by index, which decreases when an earlier line is removed.
+            // A band refers to its line by an index. The index decreases when an earlier line is removed.
             for band in &mut panel.bands {
                 let before = &panel.series[..band.around.min(panel.series.len())];
                 band.around -= before.iter().filter(|s| s.is_missing()).count();

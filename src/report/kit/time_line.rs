@@ -1,4 +1,4 @@
-//! States and curves over one time axis, as SVG that fits any width without a script.
+//! Figure of states and curves over one time axis, as SVG that fits any width without a script.
 //!
 //! Horizontal positions are percentages of the width, so the text keeps its size. Colours are CSS classes, `tone-…` and `line-…`,
 //! for the style sheet of the page.
@@ -18,7 +18,7 @@ const LETTER_PX: f64 = 8.0;
 const SEEN: f64 = 0.6;
 /// Approximate number of horizontal grid lines in a panel.
 const LEVELS: f64 = 3.0;
-/// Largest number of points in a curve; more exceed the resolution of a screen.
+/// Largest number of points of a drawn curve. A screen cannot resolve more.
 const POINTS: usize = 800;
 
 /// A figure of states and curves over time.
@@ -61,15 +61,15 @@ pub struct Span {
 /// Kind of a state, which sets its colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
-    /// No activity.
+    /// The system is not active.
     Idle,
     /// Transition to another state.
     Begins,
-    /// The commanded state.
+    /// The state that was commanded.
     Asked,
-    /// A safe state in place of the commanded state.
+    /// A safe state instead of the commanded state.
     Safe,
-    /// A failure.
+    /// The system has failed.
     Wrong,
 }
 
@@ -172,7 +172,7 @@ impl TimeLine {
         if low > high {
             return String::new();
         }
-        // the margin is also relative to the values, because the range of a large constant would vanish in rounding
+        // The margin also depends on the size of the values, because the range of a large constant would vanish in rounding.
         let room = 0.08 * (high - low).max(1.0).max(1e-6 * low.abs().max(high.abs()));
         let range = [low - room, high + room];
         let key: String = match panel.lines.len() {
@@ -271,13 +271,13 @@ fn step(length: f64, count: f64) -> f64 {
     times.unwrap_or(10.0) * power
 }
 
-/// A value with the decimals that a scale of the step `step` needs.
+/// `value` with the decimals that a scale with the step `step` needs.
 fn rounded(value: f64, step: f64) -> String {
     let decimals = (-step.log10().floor()).clamp(0.0, 6.0) as usize;
     format!("{value:.decimals$}").replace('-', "−")
 }
 
-/// Multiples of a round step within a range.
+/// Multiples of a round step within the range `low` to `high`.
 fn levels([low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
     let step = step(high - low, LEVELS);
     let first = (low / step).ceil() as i64;
@@ -330,7 +330,7 @@ mod tests {
     fn states_stand_where_their_time_is_and_are_read_out() {
         let html = time_line().html();
         assert!(html.contains("x=\"0.000%\" width=\"50.000%\""), "{html}");
-        // too short for a word: drawn with the smallest width, and the word appears only in the title
+        // A state that is too short for its word is drawn with the smallest width. Its word appears only in the title.
         assert!(html.contains("x=\"50.000%\" width=\"0.600%\""), "{html}");
         assert!(
             html.contains("OFF&lt;BOARD from 0.0 to 30.0 s, HOLD from 30.0 to 30.0 s\""),

@@ -18,7 +18,7 @@ pub struct Whiskers {
     pub scale: Scale,
     /// Positions of vertical lines behind the values, in the unit of the scale.
     pub lines: Vec<f64>,
-    /// Explanation of the vertical lines, below the figure.
+    /// Explanation of the vertical lines, shown below the figure.
     pub legend: String,
     /// The values, top to bottom.
     pub rows: Vec<Whisker>,
@@ -35,7 +35,7 @@ pub struct Whisker {
     pub value: f64,
     /// Ends of the 95 % interval, in the unit of the scale.
     pub interval: [f64; 2],
-    /// Text of the value and its interval.
+    /// Text that states the value and its interval.
     pub text: String,
 }
 
@@ -49,7 +49,7 @@ impl Whiskers {
         }
     }
 
-    /// The ends of the scale; `None` if no value is finite.
+    /// Ends of the horizontal scale; `None` if no value is finite.
     fn ends(&self) -> Option<[f64; 2]> {
         let values = self.rows.iter().flat_map(|r| [r.value, r.interval[0], r.interval[1]]);
         let all = values.chain(self.lines.iter().copied()).map(|v| self.on_scale(v));

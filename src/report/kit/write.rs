@@ -1,4 +1,4 @@
-//! Atomic writing of files: a file appears complete or not at all.
+//! Atomic writing of files: another process sees a file complete or not at all.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::{Builder, NamedTempFile};
 
-/// Why a file was not written.
+/// Reason why a file was not written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     /// A file with this path exists.
@@ -27,7 +27,7 @@ pub enum WriteError {
     },
 }
 
-/// Writes `text` to a new file at `path`. Another process never sees a partial file.
+/// Writes `text` to a new file at `path`.
 ///
 /// # Errors
 /// [`WriteError::Exists`] if `path` exists, and `WriteError::Io` if the operating system reports an error.
@@ -39,7 +39,7 @@ pub fn write_new(path: &Path, text: &str) -> Result<(), WriteError> {
     })
 }
 
-/// Writes `content` to `path` and replaces an existing file. Another process sees either the old or the new file.
+/// Writes `content` to a file at `path`, and replaces an existing one. Another process sees either the old or the new file.
 ///
 /// # Errors
 /// `WriteError::Io` if the operating system reports an error.
@@ -52,7 +52,7 @@ fn io_error(path: &Path, source: io::Error) -> WriteError {
     WriteError::Io { path: path.into(), source }
 }
 
-/// Writes the content to a temporary file in the same folder, from which it can be renamed atomically.
+/// Writes the content to a temporary file in the folder of `path`. There it can be renamed to `path` atomically.
 fn written_beside(path: &Path, content: &[u8]) -> io::Result<NamedTempFile> {
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -60,7 +60,7 @@ fn written_beside(path: &Path, content: &[u8]) -> io::Result<NamedTempFile> {
     };
     let mut builder = Builder::new();
     builder.prefix(".greylag-").suffix(".part");
-    // A temporary file is private by default; a report gets the permissions that the umask allows.
+    // a temporary file is readable by its owner alone, unless other permissions are set; the umask then limits these
     #[cfg(unix)]
     let everyone: std::fs::Permissions = std::os::unix::fs::PermissionsExt::from_mode(0o666);
     #[cfg(unix)]
@@ -70,7 +70,7 @@ fn written_beside(path: &Path, content: &[u8]) -> io::Result<NamedTempFile> {
     Ok(file)
 }
 
-/// Syncs the file to disk. A failure only gives a warning, because the file has been written.
+/// Flushes the file to disk. A failure gives only a warning, because the content has already been handed to the system.
 fn sync(file: File) {
     if let Err(error) = file.sync_all() {
         tracing::warn!("a written file could not be synced to disk: {error}");

@@ -1,4 +1,5 @@
-//! The vehicle's end of the link: the shim (the simulator's own MAVLink interface), or a simulated flight controller.
+//! The vehicle at the other end of the companion's link in a simulated flight with faults. It is a simulated aircraft with a
+//! simulated flight controller, or with the shim, the simulator's own MAVLink interface.
 
 use greylag_sitl::plant::{Inputs, PlantOptions, Truth};
 use greylag_sitl::shim::bench::Bench;
@@ -16,15 +17,15 @@ use greylag_model::GreyBox;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Counterpart {
-    /// The shim, the simulator's own MAVLink interface.
+    /// The shim, to which the companion sends surface commands.
     Sitl,
-    /// PX4, to which the companion commands surfaces.
+    /// A simulated PX4, to which the companion sends surface commands.
     Px4,
-    /// PX4, to which the companion commands attitudes.
+    /// A simulated PX4, to which the companion sends attitudes.
     Px4Attitude,
-    /// ArduPilot, to which the companion commands surfaces by RC channels.
+    /// A simulated ArduPilot, to which the companion sends surface commands as RC channels.
     Ardupilot,
-    /// ArduPilot, to which the companion commands attitudes.
+    /// A simulated ArduPilot, to which the companion sends attitudes.
     ArdupilotAttitude,
 }
 
@@ -38,7 +39,7 @@ impl Counterpart {
         Counterpart::ArdupilotAttitude,
     ];
 
-    /// The name in tables and reports.
+    /// The name of the kind in tables and reports.
     pub fn name(self) -> &'static str {
         match self {
             Counterpart::Sitl => "sitl",
@@ -49,7 +50,7 @@ impl Counterpart {
         }
     }
 
-    /// Name of the flight stack for users; `None` for the simulator.
+    /// Name of the flight controller's software for users; `None` for the shim.
     pub fn stack(self) -> Option<&'static str> {
         self.personality().map(|(personality, _)| match personality {
             Personality::Px4 => "PX4",
@@ -57,7 +58,7 @@ impl Counterpart {
         })
     }
 
-    /// The flight stack's name of `mode`.
+    /// The name that the flight controller's software gives to `mode`.
     pub fn mode_name(self, mode: ControllerMode) -> &'static str {
         let px4 = matches!(self, Counterpart::Px4 | Counterpart::Px4Attitude);
         match mode {
@@ -82,14 +83,15 @@ impl Counterpart {
     }
 }
 
-/// The simulated aircraft with its flight controller or shim.
+/// The simulated aircraft with its flight controller or with the shim.
 pub(super) enum Aircraft {
     Sitl(Box<Bench>),
     Real(Box<FlightController>),
 }
 
 impl Aircraft {
-    /// The aircraft `plant` in the scenario's wind and turbulence, with sensor noise and flight controller or shim.
+    /// The aircraft `plant` in the scenario's wind and turbulence, with sensor noise, and with the scenario's flight controller
+    /// or the shim.
     pub(super) fn new(plant: &PlantOptions, scenario: &Scenario) -> Result<Self, ShimError> {
         let mut options = ShimOptions::new(scenario.air(plant), plant.start);
         options.seed = scenario.seed;
@@ -135,7 +137,7 @@ impl Aircraft {
         }
     }
 
-    /// The command that reaches the actuators.
+    /// The commands that reach the actuators.
     pub(super) fn inputs(&self) -> Inputs {
         match self {
             Aircraft::Sitl(bench) => bench.inputs(),
@@ -150,7 +152,7 @@ impl Aircraft {
         }
     }
 
-    /// Sets the flight controller's loiter mode, as a ground station does. Returns `false` for the shim, which has no
+    /// Changes the flight controller to its hold mode, as a ground station would. Returns `false` for the shim, which has no
     /// modes.
     pub(super) fn take_over(&mut self) -> bool {
         match self {
@@ -162,7 +164,8 @@ impl Aircraft {
         }
     }
 
-    /// Advances a step. Returns `false` when the flight has ended on the ground or with a state that is not finite.
+    /// Simulates one step. Returns `false` if the flight has ended, because the aircraft hit the ground or its state is not
+    /// finite.
     pub(super) fn fly(&mut self) -> bool {
         let flown = match self {
             Aircraft::Sitl(bench) => bench.fly(),
@@ -179,8 +182,8 @@ impl Aircraft {
         }
     }
 
-    /// Whether the flight controller is in the companion's mode but holds its own attitude, because targets are
-    /// missing.
+    /// Whether ArduPilot is in GUIDED but has received no valid target recently. It then flies back to the place where GUIDED
+    /// began.
     pub(super) fn turns_back(&self) -> bool {
         match self {
             Aircraft::Sitl(_) => false,
@@ -188,14 +191,15 @@ impl Aircraft {
         }
     }
 
-    /// Whether the companion has control authority.
+    /// Whether the vehicle executes the companion's commands. A flight controller does so in MANUAL and in OFFBOARD or GUIDED;
+    /// the shim always does.
     pub(super) fn is_steered(&self) -> bool {
         self.mode()
             .is_none_or(|mode| matches!(mode, ControllerMode::Manual | ControllerMode::Guided))
     }
 }
 
-/// The companion's link to `counterpart`.
+/// The companion's side of the link to `counterpart`.
 pub(super) fn vehicle(counterpart: Counterpart, model: &GreyBox) -> Vehicle {
     let actuators = model.airframe.actuators;
     match counterpart.personality() {

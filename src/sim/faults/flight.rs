@@ -1,4 +1,5 @@
-//! One flight of 60 s under faults, in lockstep within this process.
+//! One flight of 60 s under faults, within this process. Simulator and companion advance in lockstep. A finding is a violated
+//! requirement.
 
 mod client;
 mod disk;
@@ -39,7 +40,7 @@ const STEPS: u64 = 6000;
 /// Time within which control must be returned to the flight controller after the link has failed, s.
 const HAND_BACK_S: f64 = 0.5;
 
-/// Id of the random stream for the suspensions by an overloaded processor.
+/// Id of the random stream for the times at which an overloaded processor suspends the companion.
 const STARVED: u64 = 20;
 
 /// Conditions of a flight.
@@ -79,7 +80,7 @@ pub struct Witnessed {
     pub answers: Vec<(f64, Asking, Verdict)>,
 }
 
-/// Builds companions without repeating the controller design.
+/// Flies cases, each with a copy of one companion, so that its controller is designed only once.
 pub struct CompanionFactory {
     companion: Companion,
     fallback: Box<dyn Controller>,
@@ -88,7 +89,7 @@ pub struct CompanionFactory {
 }
 
 impl CompanionFactory {
-    /// A factory of copies of `companion` for the aircraft of `model`. The fallback controller is an LQI, as in flight.
+    /// A factory of copies of `companion` for the aircraft of `model`. Their fallback controller is an LQI, as in flight.
     ///
     /// # Errors
     ///
@@ -162,8 +163,8 @@ impl CompanionFactory {
         Ok(Report { case, faults: scenario.faults, findings, texts: flight.texts })
     }
 
-    /// Flies `scenario` and returns its samples at intervals of 10 ms and the violated requirements. The samples end at
-    /// a panic.
+    /// Flies `scenario` and returns its samples at intervals of 10 ms and the violated requirements. The samples end early
+    /// at a panic or at ground contact.
     ///
     /// # Errors
     ///
@@ -233,7 +234,7 @@ impl CompanionFactory {
     }
 }
 
-/// Sets a parameter of the companion of `desk`.
+/// Sets a parameter of the companion in `desk`, which runs a companion without sockets and clocks.
 fn set(desk: &mut Desk, Setting { name, times }: &Setting) -> Result<(), FaultsError> {
     let refused = |why: String| FaultsError::Parameter { name: name.clone(), times: *times, why };
     let pilot = desk.pilot();
@@ -276,7 +277,7 @@ struct Flight {
     /// Sum of the jumps of the vehicle's clock, µs.
     clock_us: i64,
     armed: bool,
-    /// Whether the companion is killed at present. `spares` are its successors.
+    /// Whether the companion is killed at present. The `spares` are started in its place later.
     killed: bool,
     spares: Vec<Desk>,
     /// Start of the interval in which nothing has arrived while the companion controls through a flight controller, s.
@@ -296,7 +297,7 @@ impl Flight {
         }
         let end = STEPS as f64 * 0.01;
         let truth = self.aircraft.truth();
-        // the flight must end with level wings and a pitch of −2° to 6°, as in level flight or in the client's last leg
+        // required at the end are level wings and a pitch of −2° to 6°, as in level flight or in the client's last leg
         let pitch = truth.pitch_rad.to_degrees().clamp(-2.0, 6.0);
         self.judge.end(end, &truth, [0.0, pitch]);
         self.hear_of_the_disk(end);

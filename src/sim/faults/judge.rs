@@ -1,4 +1,5 @@
-//! Checks a flight under faults against requirements, at every step and at the end of the flight.
+//! Checks a flight under faults against requirements, at every step and at the end of the flight. A finding is a violated
+//! requirement. An exposure is a condition that the companion cannot prevent, such as missing commands.
 
 use greylag_sitl::plant::Truth;
 
@@ -7,11 +8,11 @@ use greylag_flight::pilot::{Decision, Source, TICK_S};
 use greylag_physics::Command;
 use greylag_physics::airframe::Envelope;
 
-/// Largest accepted transient of bank and pitch outside the envelope, degrees. A gust causes about this transient while
-/// the surfaces move at their slew limit.
+/// Largest accepted excess of bank and pitch over the envelope, degrees. A gust causes about this excess while the surfaces
+/// move at their slew limit.
 pub(super) const OVERSHOOT_DEG: f64 = 15.0;
-/// Ratio of the envelope's smallest airspeed to the airspeed below which there is a finding. There the dynamic pressure
-/// is half that of the smallest airspeed, near the stall.
+/// Ratio of the envelope's smallest airspeed to the airspeed below which there is a finding. The dynamic pressure at this
+/// lower airspeed, near the stall, is half of that at the envelope's smallest airspeed.
 pub(super) const ABOVE_STALL: f64 = std::f64::consts::SQRT_2;
 /// Largest accepted altitude loss in a flight of turns, climbs and descents that starts at 600 m, m.
 const ALTITUDE_LOSS_M: f64 = 200.0;
@@ -35,7 +36,7 @@ pub enum Finding {
     Command,
     /// A surface command exceeded the slew limit.
     Slew,
-    /// Control was not returned within 0.5 s of a dead link.
+    /// Control was not returned to the flight controller within 0.5 s after the link had failed.
     SlowHandBack,
     /// The aircraft hit the ground, or a state was not finite.
     Crash,
@@ -51,7 +52,7 @@ pub enum Finding {
     Unreported,
 }
 
-/// An exposure of the aircraft that its companion cannot prevent.
+/// Exposures of the aircraft at one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Exposure {
     /// The actuators hold their position because no command arrives, or the flight controller holds its own attitude
@@ -119,7 +120,7 @@ pub struct Found {
     pub finding: Finding,
     /// Established cause. `None` if no cause is established, and for findings on the companion.
     pub cause: Option<Cause>,
-    /// Possible causes, judged only by the times of the exposures.
+    /// Possible causes: the exposures that were active at the time of the finding or shortly before.
     pub suspects: [Option<Cause>; 3],
 }
 
@@ -205,7 +206,7 @@ impl Judge {
         self.steps as f64 * TICK_S
     }
 
-    /// The causes active now or recently.
+    /// The causes that are active now or were active recently.
     fn suspects(&self, finding: Finding) -> [Option<Cause>; 3] {
         let memory = if finding == Finding::Attitude { MEMORY_OF_ATTITUDE } else { MEMORY };
         let recent = |at: u64| self.steps - at < memory;

@@ -1,19 +1,20 @@
-//! Random faults of one flight: kinds, times and severities from a seed.
+//! Draws the random faults of one simulated flight from a seed: their kinds, times and severities. The companion (this program's
+//! autopilot) flies the aircraft through a link to a flight controller or to the simulator.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// Earliest start of a fault, s. By then the companion has detected the flight controller and has taken control.
+/// Earliest start of a fault, s after the start of the flight. By then the companion has taken control.
 pub const FIRST_S: f64 = 12.0;
-/// Time at which all faults have ended, s.
+/// Latest end of a fault, s after the start of the flight.
 pub const LAST_S: f64 = 42.0;
 
 /// Kind of a simulated fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FaultKind {
-    /// Random datagrams, or parts of the stream, are lost.
+    /// Random datagrams of the link, or pieces of its byte stream, are lost.
     Loss,
     /// Random datagrams of the link arrive twice.
     Duplication,
@@ -29,13 +30,13 @@ pub enum FaultKind {
     Flood,
     /// The link is down.
     Unplug,
-    /// Sensors repeat their last values.
+    /// All sensors repeat their last values.
     Frozen,
     /// The pitot tube is blocked.
     Airspeed,
     /// The measured angle of attack has an offset of −0.25 to 0.25 rad.
     Alpha,
-    /// The pitch rate is NaN.
+    /// The measured pitch rate is NaN.
     NotANumber,
     /// The vehicle's clock jumps forward by up to 10 s.
     Clock,
@@ -43,7 +44,7 @@ pub enum FaultKind {
     Reboot,
     /// The client stops sending commands.
     Client,
-    /// The companion is suspended for up to 0.3 s at a time. Its ticks come late and in bursts.
+    /// The companion is suspended for up to 0.3 s at a time, so that its ticks come late and in bursts.
     Starvation,
     /// The disk is full, and recording ends.
     Disk,
@@ -52,8 +53,8 @@ pub enum FaultKind {
 }
 
 impl FaultKind {
-    /// The kinds that campaigns and searches draw by their index in this list. [`Killed`](FaultKind::Killed) is excluded,
-    /// because a longer list would change the faults of every seed.
+    /// The kinds that are drawn at random, by their index in this list. [`Killed`](FaultKind::Killed) is excluded, because a
+    /// longer list would change the faults of every seed.
     pub const DRAWN: [FaultKind; 17] = [
         FaultKind::Loss,
         FaultKind::Duplication,
@@ -98,7 +99,7 @@ impl FaultKind {
         }
     }
 
-    /// Whether the kind has a severity.
+    /// Whether [`Fault::strength`] has an effect on a fault of this kind.
     pub fn has_strength(self) -> bool {
         use FaultKind::*;
         !matches!(self, Flood | Unplug | Frozen | NotANumber | Reboot | Client | Disk | Killed)
@@ -125,7 +126,8 @@ pub struct Fault {
     pub strength: f64,
 }
 
-/// Reads a severity. Numbers outside 0..1 would give delays and numbers of bit errors that cannot be simulated.
+/// Reads a severity. A number outside 0..1 is rejected, because it would give a delay or a number of bit errors that cannot be
+/// simulated.
 fn severity<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     let strength = f64::deserialize(from)?;
     match (0.0..=1.0).contains(&strength) {
@@ -138,13 +140,13 @@ fn severity<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> 
 }
 
 impl Fault {
-    /// Whether the fault is active at `now_s`, s.
+    /// Whether the fault is active at the time `now_s` (s).
     pub fn acts(&self, now_s: f64) -> bool {
         (self.from_s..self.to_s).contains(&now_s)
     }
 }
 
-/// One to three faults for flight `seed`, at random times. Faults may overlap. The first fault has the kind
+/// Draws one to three faults for the flight with the seed `seed`. They may overlap. The first fault has the kind
 /// `DRAWN[seed mod N]`, where N is the length of [`DRAWN`](FaultKind::DRAWN).
 pub fn draw(seed: u64) -> Vec<Fault> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);

@@ -1,8 +1,8 @@
-//! Flights under faults of link, sensors, clocks, processor and disk. The faults are drawn from a seed, and the flights
-//! are checked automatically.
+//! Simulated flights under faults of link, sensors, clocks, processor and disk. The faults are drawn from a seed, and the
+//! flights are checked automatically.
 //!
 //! A case is a seed, a controller and a vehicle. [`CompanionFactory::fly`] flies a case for 60 s, in lockstep within
-//! this process. It uses the companion's pilot and vehicle link, and the aircraft of the simulator's MAVLink shim.
+//! this process. It uses the companion's pilot and vehicle link, and the aircraft and MAVLink side of the simulator.
 
 mod counterpart;
 mod flight;

@@ -1,4 +1,6 @@
-//! The flight rules in signal temporal logic. Every flight must meet these requirements, whatever its faults.
+//! The flight rules, as formulas of signal temporal logic. Every flight must meet these requirements, whatever its faults.
+//!
+//! The robustness of a formula in a flight is a normalised margin. It is negative if the flight violates the formula.
 
 use super::counterpart::ControllerMode;
 use super::judge::{ABOVE_STALL, OVERSHOOT_DEG};
@@ -16,7 +18,8 @@ const UNIT_M: f64 = 100.0;
 const UNIT_S: f64 = 5.0;
 /// Altitude loss that is accepted in a flight of turns, climbs and descents, m.
 const ALTITUDE_LOSS_M: f64 = 400.0;
-/// Time for which violations are still excused after the aircraft was exposed ([`Sample::exposed`]), s.
+/// Time for which violations are excused after the aircraft was exposed to a condition that the companion cannot prevent
+/// ([`Sample::exposed`]), s.
 const MEMORY_S: f64 = 3.0;
 /// RMS of a surface's high-pass filtered command (−1..1) above which the surface counts as oscillating.
 const SWING: f64 = 0.5;
@@ -24,9 +27,9 @@ const SWING: f64 = 0.5;
 const HELD_S: f64 = 0.055;
 /// Time within which a commanded attitude must be reached, s.
 const REACHED_S: f64 = 5.0;
-/// Age above which a decision is disregarded, s. An overloaded processor suspends the companion for a shorter time.
+/// Age above which a decision is disregarded, s. It exceeds the time for which an overloaded processor suspends the companion.
 const STALE_S: f64 = 0.5;
-/// Interval in which a repeated report is suppressed, s.
+/// Time for which the companion may suppress the repetition of a report, s.
 const COMPLAINED_S: f64 = 5.0;
 /// Time within which an oscillation must end, s. The companion's oscillation guard needs 1 s to detect an oscillation, and
 /// then returns control.
@@ -45,11 +48,11 @@ pub struct Sample {
     pub held_s: f64,
     /// Largest change of a surface command (−1..1) since the last sample; 0 without a new decision.
     pub moved: f64,
-    /// Whether the flight controller executes the companion's commands. Always true for the simulator's shim.
+    /// Whether the flight controller executes the companion's commands. Always true for the shim, the simulator's MAVLink side.
     pub steered: bool,
     /// Whether the companion intends to control.
     pub engaged: bool,
-    /// Whether the companion knows from the flight controller's mode that its commands are executed.
+    /// Whether the flight controller's reported mode confirms to the companion that its commands are executed.
     pub confirmed: bool,
     /// Time since data last arrived from the vehicle, s.
     pub silent_s: f64,
@@ -64,7 +67,7 @@ pub struct Sample {
     pub airspeed_mps: f64,
     /// Altitude loss since the start, m.
     pub lost_m: f64,
-    /// RMS over about 1 s of the high-pass filtered commands (−1..1) of aileron and elevator; the larger of the two.
+    /// The larger of two RMS values: those of the high-pass filtered aileron and elevator commands (−1..1) over about 1 s.
     /// Surfaces that the companion does not command are excluded.
     pub swing: f64,
     /// Whether the aircraft is exposed to a condition that its companion cannot prevent: no command arrives, no state
@@ -78,7 +81,7 @@ pub struct Sample {
     pub asked: bool,
     /// Altitude above mean sea level, m.
     pub altitude_m: f64,
-    /// The companion's status for its clients; `None` while it is killed.
+    /// The companion's status for its clients; `None` while the companion's process does not run.
     pub shown: Option<Shown>,
     /// The flight controller's mode; `None` for the shim.
     pub controller: Option<ControllerMode>,
@@ -134,34 +137,34 @@ fn decided(holds: impl Fn(&Decision) -> bool + Send + Sync + 'static) -> Rule {
     is(move |s| s.decided(&holds))
 }
 
-/// The rule holds, or the aircraft was exposed within the last `MEMORY_S`.
+/// Formula: `rule` holds, or the aircraft was exposed within the last `MEMORY_S`.
 fn unless_exposed(rule: Rule) -> Rule {
     is(|s| s.exposed).once(MEMORY_S).or(rule)
 }
 
-/// The attitude error is below `most` degrees. The rule holds before the first decision.
+/// Formula: the attitude error is below `most` degrees. It holds before the first decision.
 fn near(most: f64) -> Rule {
     Formula::atom(move |s: &Sample| s.error_deg().map_or(1.0, |e| (most - e) / most))
 }
 
-/// The companion has held the same commanded attitude for less than `seconds`.
+/// Formula: the companion has held the same commanded attitude for less than `seconds`.
 fn steady_for_less(seconds: f64) -> Rule {
     Formula::atom(move |s: &Sample| (seconds - s.steady_s) / UNIT_S)
 }
 
-/// A text is sent within 1 s after `event` starts, or one was sent in the last `COMPLAINED_S`.
+/// Formula: a text is sent within 1 s after `event` starts, or a text was sent in the last `COMPLAINED_S`.
 fn reported(event: Rule) -> Rule {
     let spoke = || is(|s| s.spoke);
     event.rises().implies(spoke().eventually(1.0).or(spoke().once(COMPLAINED_S)))
 }
 
-/// The condition `state` ends within `seconds`, or the last decision becomes older than `STALE_S`.
+/// Formula: the condition `state` ends within `seconds`, or the last decision becomes older than `STALE_S`.
 fn ends(state: impl Fn(&Sample) -> bool + Copy + Send + Sync + 'static, seconds: f64) -> Rule {
     is(state).implies(is(move |s| !state(s) || s.age_s > STALE_S).eventually(seconds))
 }
 
-/// The commanded angle, which `of` reads from the target (rad), lies between the limits that `ends` reads from the envelope
-/// (degrees). The rule holds while no attitude is commanded.
+/// Formula: the commanded angle lies between its limits. `of` reads the angle from the target (rad), `ends` reads the limits
+/// from the envelope (degrees). The formula holds while no attitude is commanded.
 fn target_inside(of: fn(&Target) -> f64, ends: fn(&Envelope) -> [f64; 2]) -> Rule {
     Formula::atom(move |s: &Sample| {
         let [least, most] = ends(&s.envelope);

@@ -1,4 +1,6 @@
 //! Conditions of a flight under faults: faults, requests, wind, turbulence and parameters.
+//!
+//! The companion is Greylag's autopilot. Its client commands attitudes. The shim is the simulator's own MAVLink interface.
 
 use greylag_sitl::air::Turbulence;
 use greylag_sitl::plant::PlantOptions;
@@ -37,7 +39,7 @@ pub struct Asked {
     pub what: Asking,
 }
 
-/// Requests of clients and ground stations.
+/// Kinds of requests from clients and ground stations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Asking {
@@ -68,8 +70,8 @@ pub struct Setting {
     pub times: f64,
 }
 
-/// The parameters that are varied, with the smallest and largest multiple of the default. The limits of the envelope
-/// are only narrowed, because a wider envelope carries no guarantee.
+/// The parameters that are varied, with the smallest and largest multiple of the default. The limits of the envelope are only
+/// narrowed, because the companion guarantees nothing for a wider envelope.
 const SETTINGS: [(&str, [f64; 2]); 9] = [
     ("GL_OFFB_LOSS_S", [0.3, 3.0]),
     ("GL_VEH_LOSS_S", [0.3, 3.0]),
@@ -95,8 +97,8 @@ pub struct ControllerSetting {
 /// Values of flight-controller parameters.
 type Values = [(&'static str, &'static [f64])];
 
-/// PX4 parameters that are varied, with their values. Some values are suitable, some are unsuitable, and some are PX4's
-/// defaults. The companion must refuse values with which it cannot fly safely.
+/// PX4 parameters that are varied, with their values. Some values are suitable, some are not, and some are PX4's defaults. The
+/// companion must refuse values with which it cannot fly safely.
 const PX4_SETTINGS: &Values = &[
     ("COM_RC_IN_MODE", &[0.0, 1.0, 2.0, 3.0, 4.0]),
     ("COM_RC_LOSS_T", &[0.1, 0.5, 1.0, 5.0]),
@@ -136,9 +138,9 @@ const ARDUPILOT_SETTINGS: &Values = &[
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
-    /// The vehicle's end of the link.
+    /// The vehicle at the other end of the companion's link.
     pub counterpart: Counterpart,
-    /// Seed of the random numbers that are not part of the scenario: sensor noise and link faults.
+    /// Seed of the random numbers that are not part of the scenario, for instance those of link faults and turbulence.
     pub seed: u64,
     /// Steady wind, the velocity of the air over the ground, north-east-down, m/s.
     pub wind_ned_mps: [f64; 3],
@@ -158,8 +160,7 @@ pub struct Scenario {
     pub controller_parameters: Vec<ControllerSetting>,
 }
 
-/// Default legs of the client: start (s), roll and pitch (degrees). They contain turns to both sides, a climb and a
-/// descent.
+/// Default legs of the client: start (s), roll and pitch (degrees). They are turns to both sides, a climb and a descent.
 const LEGS: [(f64, f64, f64); 6] = [
     (0.0, 0.0, 3.0),
     (12.0, 35.0, 5.0),
@@ -170,7 +171,7 @@ const LEGS: [(f64, f64, f64); 6] = [
 ];
 
 impl Scenario {
-    /// The flight of a seed in the fault campaign: still air, six legs, no other requests.
+    /// The flight of a seed in the fault campaign: random faults, still air, six legs, no other requests.
     pub fn of_seed(counterpart: Counterpart, seed: u64) -> Scenario {
         let leg = |(from_s, roll_deg, pitch_deg)| Leg { from_s, roll_deg, pitch_deg };
         Scenario {
@@ -186,7 +187,7 @@ impl Scenario {
         }
     }
 
-    /// The flight of a random seed, with four random changes.
+    /// The flight of a random seed, changed four times by [`Scenario::varied`].
     pub fn drawn(counterpart: Counterpart, random: &mut impl Rng) -> Scenario {
         let mut scenario = Scenario::of_seed(counterpart, random.random_range(0..1_000_000));
         for _ in 0..4 {
@@ -198,8 +199,8 @@ impl Scenario {
     /// Checks a scenario from a file.
     ///
     /// # Errors
-    /// If the legs are not in the order of time. The client flies the last leg of the list that has started. A leg that
-    /// precedes an earlier one in the list would therefore never be flown.
+    /// If the legs are not in the order of time. The client flies the last leg of the list that has started. A leg that starts
+    /// before the previous leg of the list would therefore never be flown.
     pub fn check(&self) -> Result<(), String> {
         match self.legs.windows(2).find(|pair| pair[1].from_s < pair[0].from_s) {
             Some([before, after]) => Err(format!(
@@ -210,7 +211,8 @@ impl Scenario {
         }
     }
 
-    /// A copy with one random change.
+    /// A copy with one random change. A change that does not apply, such as the removal of a request if there is none, leaves
+    /// the copy equal.
     pub fn varied(&self, random: &mut impl Rng) -> Scenario {
         let mut changed = self.clone();
         match random.random_range(0..14) {
@@ -244,7 +246,7 @@ impl Scenario {
                 fault.strength = (fault.strength + random.random_range(-0.3..0.3)).clamp(0.0, 1.0);
             }
             7 if changed.legs.len() > 1 => {
-                // the last leg stays level, because the check at the end of the flight requires it
+                // the last leg stays level, because the check at the end of the flight requires a level attitude
                 let place = random.random_range(0..changed.legs.len() - 1);
                 let leg = &mut changed.legs[place];
                 leg.roll_deg = random.random_range(-60.0..60.0);
@@ -315,7 +317,7 @@ impl Scenario {
         all
     }
 
-    /// The aircraft `plant` in the scenario's wind and turbulence.
+    /// The simulated aircraft `plant` in the scenario's wind and turbulence.
     pub(super) fn air(&self, plant: &PlantOptions) -> PlantOptions {
         let mut plant = plant.clone();
         if self.wind_ned_mps != [0.0; 3] {

@@ -1,6 +1,7 @@
-//! Search for flights that violate a flight rule. A new flight is a variation of an earlier flight that came close to a
-//! violation (PGFuzz, Kim et al., NDSS 2021), or is drawn at random. A flight with a violation is simplified as long as the
-//! violation remains.
+//! Search for flights that violate a flight rule. A new flight is drawn at random, or it is a variation of the earlier flight
+//! that came closest to violating a rule (PGFuzz, Kim et al., NDSS 2021). At the end, each violating flight is simplified as
+//! long as the violation remains. The robustness of a flight is its margin to a violation, −1..1; it is negative if the rule is
+//! violated.
 
 use std::ops::ControlFlow;
 
@@ -16,17 +17,17 @@ use super::scenario::Scenario;
 use greylag_flight::pilot::TICK_S;
 use greylag_num::stream::stream;
 
-/// Number of flights per round, which run in parallel. The number is fixed to make the result independent of the number
-/// of cores.
+/// Number of flights of a round. They run in parallel. The number is fixed to make the result independent of the number of
+/// cores.
 const TOGETHER: u64 = 16;
-/// Fraction of the flights that are drawn at random. The others are variations of earlier flights.
+/// Fraction of the flights that are drawn at random although there is an earlier flight to vary.
 const FRESH: f64 = 0.25;
 /// Largest number of simplifications of a flight.
 const ROUNDS: usize = 8;
 /// Id of the random stream of the search.
 const SEARCH: u64 = 61;
 
-/// The flight that came closest to the violation of a rule.
+/// Result of the search for one rule, with the flight that came closest to violating it.
 #[derive(Clone, Debug)]
 pub struct Nearest {
     /// Name of the rule.
@@ -37,7 +38,7 @@ pub struct Nearest {
     pub flights: u64,
     /// Number of flights that violated the rule.
     pub broken: u64,
-    /// Smallest robustness of all flights, −1..1; negative when violated, infinite if the rule applied to no flight.
+    /// Smallest robustness over all flights. Infinite if the rule applied to no flight.
     pub distance: f64,
     /// Time of the smallest robustness within its flight, s.
     pub at_s: f64,
@@ -46,8 +47,8 @@ pub struct Nearest {
     pub scenario: Option<Scenario>,
 }
 
-/// Flies `scenario`. Returns for each rule the smallest robustness and the time at which it occurred, s; `None` if the rule
-/// does not apply to the simulated vehicle (`Counterpart`). A panic violates all applicable rules.
+/// Flies `scenario`. Returns for each rule the smallest robustness and the time at which it occurred, s. `None` for a rule that
+/// does not apply to the simulated vehicle (`Counterpart`). If the program panics, the robustness of all applicable rules is −1.
 ///
 /// # Errors
 ///
@@ -61,7 +62,7 @@ pub fn distances(
     Ok(judged(rules, scenario.counterpart, &samples, &found))
 }
 
-/// The results of [`distances`] for a flight with `counterpart` that has these samples and findings.
+/// Computes the results of [`distances`] from the samples and findings of a flight with `counterpart`.
 pub fn judged(
     rules: &[Policy],
     counterpart: Counterpart,
@@ -84,9 +85,9 @@ fn nearest(rule: &Policy, samples: &[Sample], panicked: bool) -> (f64, f64) {
     (distance, place as f64 * TICK_S)
 }
 
-/// Flies `flights` flights with companions of `factory` and searches for violations of the flight rules. Random flights
-/// use one of the `counterparts`. `progress` receives the number of flights and of violated rules so far, and can
-/// cancel the search.
+/// Flies `flights` flights with companions of `factory` and searches for violations of the flight rules. A random flight has one
+/// of the `counterparts` as its vehicle. `progress` receives the number of flights and of violated rules so far, and can cancel
+/// the search.
 ///
 /// # Errors
 ///

@@ -1,17 +1,18 @@
-//! Signal temporal logic over sampled flights: the robustness of a formula.
+//! Signal temporal logic: computes how robustly a flight, given by samples, meets a formula.
 //!
-//! A formula has a robustness at each sample (Donzé and Maler, Robust Satisfaction of Temporal Logic over Real-Valued
-//! Signals, FORMATS 2010). The robustness is positive where the formula holds and negative where it is violated. Its
-//! magnitude is the margin. `Eventually` holds if its window extends past the end of the flight. For `Once`, the time
-//! before the first sample counts as violated.
+//! A formula is a statement on the flight. It has a robustness at each sample (Donzé and Maler, Robust Satisfaction of Temporal
+//! Logic over Real-Valued Signals, FORMATS 2010). The robustness is positive where the formula holds and negative where it is
+//! violated. Its magnitude is the margin. Two conventions hold at the ends of a flight. Where the window of `Eventually` extends
+//! past the end, the formula holds. In the window of `Once`, the time before the first sample counts as violated.
 
 use std::collections::VecDeque;
 
 use greylag_flight::pilot::TICK_S;
 
-/// A formula over samples `S`, one every tick of 10 ms.
+/// A formula over samples `S`, of which there is one every 10 ms.
 pub enum Formula<S> {
-    /// A robustness value, −1..1: positive where the statement holds. NaN counts as −1.
+    /// A statement on one sample. The function returns its robustness: positive if the statement holds. It is limited to −1..1,
+    /// and NaN counts as −1.
     Atom(Box<dyn Fn(&S) -> f64 + Send + Sync>),
     /// Negation: the formula does not hold.
     Not(Box<Formula<S>>),
@@ -23,22 +24,22 @@ pub enum Formula<S> {
     Eventually(f64, Box<Formula<S>>),
     /// Once: the formula has held at some sample within this past time, s.
     Once(f64, Box<Formula<S>>),
-    /// Rise: the formula holds now and did not hold at the previous sample. The first sample is no rise.
+    /// Rise: the formula holds now and did not hold at the previous sample. At the first sample there is no rise.
     Rises(Box<Formula<S>>),
 }
 
 impl<S> Formula<S> {
-    /// A statement with the robustness `distance`, which is clamped to −1..1.
+    /// A statement on one sample with the robustness `distance`, which is limited to −1..1.
     pub fn atom(distance: impl Fn(&S) -> f64 + Send + Sync + 'static) -> Self {
         Formula::Atom(Box::new(distance))
     }
 
-    /// A Boolean statement with robustness ±1.
+    /// A statement on one sample with robustness 1 if it is true and −1 if it is false.
     pub fn is(statement: impl Fn(&S) -> bool + Send + Sync + 'static) -> Self {
         Formula::atom(move |sample| if statement(sample) { 1.0 } else { -1.0 })
     }
 
-    /// Implication: `self` implies `then`.
+    /// Implication: where `self` holds, `then` holds too.
     pub fn implies(self, then: Self) -> Self {
         Formula::Any(vec![Formula::Not(Box::new(self)), then])
     }
@@ -120,9 +121,9 @@ fn together<S>(
     sum
 }
 
-/// Moving maximum over each value and the `before` values that precede it. Values before the first count as `beyond`.
+/// Moving maximum over each value and the `before` values that precede it. The values before the first one count as `beyond`.
 fn largest_of_the_last(values: &[f64], before: usize, beyond: f64) -> Vec<f64> {
-    // indices with decreasing values; the first index has the maximum of the window
+    // indices of values that decrease; the first is that of the maximum in the window
     let mut falling = VecDeque::<usize>::new();
     let mut largest = Vec::with_capacity(values.len());
     for (place, value) in values.iter().enumerate() {
@@ -150,7 +151,7 @@ mod tests {
     #[test]
     fn windows_look_ahead_and_back() {
         let flight = [0.1, -0.5, 0.3, -0.2, -0.4];
-        // a window of two samples; a window past the end of the flight holds
+        // the windows reach two samples ahead and back; a window past the end of the flight counts as 1
         assert_eq!(value().eventually(0.02).distances(&flight), [0.3, 0.3, 0.3, 1.0, 1.0]);
         assert_eq!(value().once(0.02).distances(&flight), [0.1, 0.1, 0.3, 0.3, 0.3]);
         assert_eq!(value().once(0.0).distances(&flight), flight);
@@ -159,7 +160,7 @@ mod tests {
 
     #[test]
     fn an_event_is_answered_in_time_or_not() {
-        // 1: request, 2: reply
+        // 1 stands for a request, 2 for a reply
         let answered = Formula::is(|x: &f64| *x == 1.0)
             .rises()
             .implies(Formula::is(|x: &f64| *x == 2.0).eventually(0.02));

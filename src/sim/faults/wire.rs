@@ -20,7 +20,7 @@ impl Wire {
         Wire { random, under_way: Vec::new() }
     }
 
-    /// Sends a batch at `step` under the active `faults`.
+    /// Sends `bytes` as one batch at `step`, under the active `faults`.
     pub fn send(&mut self, step: u64, mut bytes: Vec<u8>, faults: &[Fault]) {
         let mut arrives = step;
         let mut copies = 1;

@@ -1,4 +1,5 @@
-//! Effects of the imported model, with coefficients from the measured derivatives and the polar.
+//! The effects of a model that is imported from JSBSim. An effect is one physical contribution to the forces and moments. Its
+//! coefficients follow from differences of the forces and moments that JSBSim computes.
 
 use super::fits::line;
 use super::propeller::Propeller;
@@ -7,13 +8,13 @@ use greylag_model::textbook::Estimate;
 use greylag_physics::catalogue::describe;
 use greylag_physics::size::Size;
 
-/// An effect of the model file with its coefficients.
+/// The id of an effect, and its coefficients.
 pub(super) type Effect = (&'static str, Vec<Estimate>);
 
 const SOURCE: &str = "central difference of JSBSim's loads";
 
-/// Clamps coefficients to the plausible range for an aircraft of `size`. Clamped coefficients are reported in
-/// `left_out`.
+/// Limits the coefficients of an effect to the range that is plausible for an aircraft of `size`. A text on each coefficient
+/// that this changes is added to `left_out`.
 fn bounded(effect: &str, estimates: &mut [Estimate], size: &Size, left_out: &mut Vec<String>) {
     let coefficients = describe(effect).map_or(&[][..], |about| about.coefficients);
     for estimate in estimates {
@@ -30,7 +31,7 @@ fn bounded(effect: &str, estimates: &mut [Estimate], size: &Size, left_out: &mut
     }
 }
 
-/// All effects of the model with their coefficients.
+/// All effects of the model, with their coefficients from the polar, the derivatives `slopes` and the further effects `beside`.
 pub(super) fn effects(
     polar: &Polar,
     slopes: &Slopes,
@@ -83,11 +84,11 @@ pub(super) fn effects(
     all
 }
 
-/// The derivatives of lift and pitching moment with respect to α̇c/2V count as zero below this magnitude.
+/// Derivatives of lift and pitching moment coefficient with respect to α̇c/2V count as zero below this magnitude.
 const NO_RATE: f64 = 1e-3;
 
 impl Beside {
-    /// Adds the effects to `all`. The linear coefficients are replaced by those that hold without these effects.
+    /// Adds these effects to `all`. They take over a part of some linear coefficients, which are reduced to the remaining part.
     fn put(&self, all: &mut Vec<Effect>) {
         let [lift, pitch] = [self.alpha_rate[2], self.alpha_rate[4]];
         if lift.abs() > NO_RATE || pitch.abs() > NO_RATE {
@@ -155,7 +156,7 @@ impl Propeller {
     }
 }
 
-/// Sets the coefficient `name` of `effect`.
+/// Sets the coefficient `name` of `effect` in `all` to `value`.
 fn set(all: &mut [Effect], effect: &str, name: &str, value: f64) {
     let own = all.iter_mut().filter(|(id, _)| *id == effect).flat_map(|(_, numbers)| numbers);
     own.filter(|number| number.0 == name).for_each(|number| number.1 = value);

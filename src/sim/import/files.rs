@@ -1,4 +1,4 @@
-//! The files of an imported aircraft: airframe and model.
+//! Texts of the airframe file and the model file of an aircraft that is imported from JSBSim.
 
 use greylag_sitl::plant::{MassProperties, Stops, Travel};
 
@@ -55,7 +55,7 @@ pub(super) fn airframe(
     let incidence = polar.incidence(lift);
     let limits = incidence_limits(incidence, polar.incidence(lift_max));
     let descent = descent(subject, polar, thrust, [incidence, lift]);
-    // the pitch limits of a glider are relative to its descent angle
+    // the lower pitch limit of a glider is relative to its descent angle
     let lowest = (5.0 * ((incidence - descent).to_degrees() / 5.0 - 2.0).floor()).min(-15.0);
     out += &format!(
         "[controls.throttle]\nlag_s = {{ value = {lag:.4}, source = \"step of the command\" }}\n\n{limits}\

@@ -1,4 +1,4 @@
-//! Fits of lines and filters to the measured behaviour of an aircraft.
+//! Fits of a line and of linear filters to the response of a JSBSim aircraft, for its import as a model.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -10,8 +10,8 @@ use greylag_physics::servos::{Surface, Travel};
 /// Range of the angle of attack in which the pitching moment is fitted by a line, degrees.
 const LINE_DEG: [f64; 2] = [-4.0, 10.0];
 
-/// Intercept and slope (1/rad) of a line through the pitching moment coefficient over the angle of attack, and the rms
-/// residual as a fraction of the coefficient's standard deviation.
+/// Fits a line to the pitching moment coefficient over the angle of attack. Returns its intercept, its slope (1/rad), and the rms
+/// residual as a fraction of the standard deviation of the coefficient.
 pub(super) fn line(polar: &Polar) -> [f64; 3] {
     let [low, high] = LINE_DEG;
     let inside = |a: &f64| (low - 1e-6..=high + 1e-6).contains(&a.to_degrees());
@@ -24,8 +24,8 @@ pub(super) fn line(polar: &Polar) -> [f64; 3] {
     [first, slope, (left / square(&|k| moments[k] - middle).max(1e-30)).sqrt()]
 }
 
-/// Frequency (rad/s) and damping ratio of the second-order filter whose response to a step of `end` is closest to
-/// `observed`, sampled every 0.01 s.
+/// Natural frequency (rad/s) and damping ratio of the second-order filter whose response to a step of size `end` is closest to
+/// the response `observed`, sampled every 0.01 s.
 pub(super) fn second_order(observed: &[f64], end: f64) -> [f64; 2] {
     let miss = |frequency: f64, damping: f64| {
         let Surface { filter: [b, a1, a2], .. } =
@@ -43,18 +43,18 @@ pub(super) fn second_order(observed: &[f64], end: f64) -> [f64; 2] {
     all.min_by(|a, b| miss(a[0], a[1]).total_cmp(&miss(b[0], b[1]))).unwrap_or([50.0, 0.7])
 }
 
-/// Fraction of a throttle step below which the response counts as zero, as in a glider.
+/// Fraction of a throttle step below which the response counts as zero. A glider, for example, has no response.
 const NO_ANSWER: f64 = 0.01;
-/// Time constant used for a throttle that has no effect, s.
+/// Time constant that is used if the throttle has no effect, s.
 const USUAL_LAG_S: f64 = 0.2;
 
-/// Time constant (s) of the response `observed` to a throttle step of 0.5, sampled every 0.01 s, from the time to 63 %
-/// of the step.
+/// Time constant (s) of the response `observed` to a throttle step of 0.5, sampled every 0.01 s. It is the time after which the
+/// response has reached 63 % of the step.
 pub(super) fn first_order(observed: &[f64]) -> f64 {
     let end = 0.5;
     match observed.iter().position(|x| *x >= 0.632 * end) {
         Some(k) => (0.01 * k as f64).max(0.01),
-        // 63 % was not reached: the time constant follows from the fraction of the step at the end of the observation
+        // if 63 % is not reached, the time constant follows from the fraction of the step that is reached at the end
         None => {
             let last = observed.last().copied().unwrap_or(0.0) / end;
             if last < NO_ANSWER {
@@ -65,28 +65,28 @@ pub(super) fn first_order(observed: &[f64]) -> f64 {
     }
 }
 
-/// Range of the time constants that are compared, s: from one step to the largest value of the effect `thrust_lag`.
+/// Smallest and largest time constant that is tried, s: 0.01 s, and the largest value of the effect `thrust_lag`.
 const THRUST_LAGS_S: [f64; 2] = [0.01, 10.0];
-/// Residual of a step response, as a fraction of the step, above which a first-order lag does not describe it.
+/// Residual of the fitted step response, as a fraction of the step, from which on a first-order lag does not describe the thrust.
 const NO_LAG: f64 = 0.5;
-/// Largest accepted ratio of the residual with the lag to that without a lag.
+/// Largest accepted ratio of the residual with the lag to the residual without a lag.
 const MUCH_BETTER: f64 = 0.8;
-/// Number of geometrically spaced time constants that are compared.
+/// Number of time constants that are tried, in geometric steps.
 const THRUST_LAGS: usize = 400;
 
 /// First-order lag between throttle position and thrust.
 pub(super) struct ThrustLag {
     /// Time constant in s.
     pub lag: f64,
-    /// Residual of the step response: rms as a fraction of the thrust's change.
+    /// RMS residual of the fitted step response, as a fraction of the change of the thrust.
     pub left: f64,
-    /// Whether the lag describes the step response, and describes small movements better than a model without a lag.
+    /// Whether the lag describes the step response, and describes a sine of the throttle better than a model without a lag.
     pub better: bool,
 }
 
-/// The lag that fits the step response `raised` best, validated on the response `waved` to a sine. Each response lists
-/// thrust (N) and throttle position after each `step` (s). At the throttle position δ, the steady thrust is `slope` δ +
-/// `curve` δ² plus a constant. `None` if the thrust does not change, or if the lag is at most two steps.
+/// The lag that fits the response `raised` to a throttle step best. The response `waved` to a sine of the throttle validates it.
+/// Each response lists thrust (N) and throttle position after each time step `step` (s). At the throttle position δ, the steady
+/// thrust is `slope` δ + `curve` δ² plus a constant. `None` if the thrust does not change, or if the lag is at most two steps.
 pub(super) fn thrust_lag(
     [raised, waved]: [&[[f64; 2]]; 2],
     step: f64,
@@ -99,7 +99,7 @@ pub(super) fn thrust_lag(
     if (last[1] - first[1]).abs() < NO_ANSWER || rise.abs().min(expected.abs()) < 1e-3 * largest {
         return None;
     }
-    // rms residual of a lag, as a fraction of the step
+    // rms residual of the response `answer` with the time constant `lag`, as a fraction of the thrust step
     let misfit = |answer: &[[f64; 2]], lag: f64| {
         let [thrust, throttle] = answer.first().copied().unwrap_or_default();
         let (gain, keep) = (step / (2.0 * lag + step), (2.0 * lag - step) / (2.0 * lag + step));

@@ -1,10 +1,12 @@
-//! Lateral derivatives that depend on the lift coefficient, and aileron derivatives that depend on the angle of attack.
+//! Determines lateral derivatives of a JSBSim aircraft by finite differences: how the stability derivatives depend on the
+//! lift coefficient, and how the aileron derivatives depend on the angle of attack.
 
 use greylag_sitl::plant::{Inputs, PlantError, Start};
 
 use super::{ALPHA, ANGLE, COMMAND, RATE, Subject};
 
-/// A derivative counts as constant if its relative change between two angles of attack is below this value.
+/// Derivatives count as constant if their changes between two angles of attack are below this fraction of the largest
+/// derivative of their group.
 const CONSTANT: f64 = 0.02;
 
 /// Lateral derivatives as linear functions of the lift coefficient.
@@ -24,8 +26,8 @@ pub(super) struct AileronOverIncidence {
 }
 
 impl Subject<'_> {
-    /// Clδa and Cnδa from two angles of attack. `unit` is the aileron deflection (rad) at [`COMMAND`]. `None` if the
-    /// derivatives are nearly equal at both angles.
+    /// Clδa and Cnδa as linear functions of the angle of attack, from their values at two angles. `unit` is the aileron
+    /// deflection (rad) at [`COMMAND`]. `None` if the derivatives are nearly equal at both angles.
     pub(super) fn aileron_over_incidence(
         &mut self,
         unit: f64,
@@ -45,8 +47,8 @@ impl Subject<'_> {
         Ok(changes.then_some(AileronOverIncidence { without, by_incidence }))
     }
 
-    /// Clr, Clβ, Cnp and Cnβ from two angles of attack. `None` if the derivatives or the lift coefficients are nearly equal at
-    /// both angles.
+    /// Clr, Clβ, Cnp and Cnβ as linear functions of the lift coefficient, from their values at two angles of attack. `None` if
+    /// the derivatives or the lift coefficients are nearly equal at both angles.
     pub(super) fn lateral_with_lift(&mut self) -> Result<Option<WithLift>, PlantError> {
         let mut at = [[0.0; 5]; 2];
         for (own, sign) in at.iter_mut().zip([-1.0, 1.0]) {
@@ -74,7 +76,7 @@ impl Subject<'_> {
         let most = |k: [usize; 2]| {
             k.map(|k| low[k].abs().max(high[k].abs())).into_iter().fold(0.0, f64::max)
         };
-        // Clr and Cnp are compared with one scale, Clβ and Cnβ with another
+        // changes of Clr and Cnp are relative to the larger of the two, changes of Clβ and Cnβ likewise
         let scale = [most([0, 2]), most([1, 3]), most([0, 2]), most([1, 3])];
         let changes = (0..4).any(|k| (high[k] - low[k]).abs() > CONSTANT * scale[k]);
         Ok((changes && lift.abs() > 1e-3).then_some(WithLift { without, by_lift }))

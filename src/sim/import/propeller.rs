@@ -1,4 +1,7 @@
-//! Effects of a running propeller other than thrust: slipstream on the tail, gyroscopic moments, P-factor.
+//! Measures effects of a running propeller on an aircraft in JSBSim: slipstream on the tail, gyroscopic moments, P-factor.
+//!
+//! The slipstream changes the effectiveness of a surface in proportion to the thrust coefficient T/(q S), which is the thrust
+//! divided by dynamic pressure and wing area.
 
 use greylag_sitl::plant::{Inputs, PlantError, Start, Travel};
 
@@ -6,21 +9,21 @@ use super::propulsion::{LBF_FT, NO_ARM};
 use super::{ALPHA, ANGLE, COMMAND, RATE, Subject, at_command};
 use greylag_num::least_squares;
 
-/// Throttle values at which the settled engines are measured.
+/// Throttle values at which the effects are measured, after the engines have reached a steady state.
 const THROTTLES: [f64; 3] = [0.2, 0.6, 1.0];
 /// Smallest relative change of a surface's effectiveness at full throttle that counts as slipstream.
 const NO_SLIPSTREAM: f64 = 0.01;
 /// Angular momentum that counts as zero, as a fraction of mass · span² per second.
 const NO_MOMENTUM: f64 = 1e-4;
-/// Distance of the thrust from the hub that counts as zero, in chords per radian of the angle of attack.
+/// P-factor that counts as zero: distance of the thrust from the hub, in chords per radian of the angle of attack.
 const NO_OFFSET: f64 = 1e-2;
 
 /// Propeller effects of the aircraft; `None` for an effect that counts as zero.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Propeller {
-    /// Elevator effectiveness without thrust, 1/rad, and its slope over thrust divided by dynamic pressure and area.
+    /// Elevator effectiveness without thrust, 1/rad, and its slope over the thrust coefficient.
     pub(super) elevator: Option<[f64; 2]>,
-    /// Rudder effectiveness in yaw without thrust, 1/rad, and its slope, as for the elevator.
+    /// Rudder effectiveness in yaw without thrust, 1/rad, and its slope over the thrust coefficient.
     pub(super) rudder: Option<[f64; 2]>,
     /// Angular momentum at idle and its increase at full throttle, N m s.
     pub(super) gyro: Option<[f64; 2]>,
@@ -70,7 +73,7 @@ impl Subject<'_> {
         })
     }
 
-    /// Settled thrust (N), and pitching and yawing moment of the engines (N m), in `state`.
+    /// Steady-state thrust (N), and pitching and yawing moment of the engines (N m), in `state`.
     fn engine_moments(
         &mut self,
         state: &Start,
@@ -82,9 +85,9 @@ impl Subject<'_> {
         Ok((thrust, [moment("moments/m-prop-lbsft"), moment("moments/n-prop-lbsft")]))
     }
 
-    /// Effectiveness of a surface: the derivative of the coefficient with index `of` with respect to its deflection, 1/rad.
-    /// Returns the effectiveness without thrust, and its slope over thrust divided by dynamic pressure and area. `set`
-    /// commands the surface to ±`COMMAND`, at which its deflection is ±`unit` (rad). `None` if there is no slipstream.
+    /// Effectiveness of a surface: the derivative of the coefficient with index `of` with respect to the deflection, 1/rad.
+    /// Returns the effectiveness without thrust, and its slope over the thrust coefficient. `set` commands the surface to
+    /// ±`COMMAND`, at which its deflection is ±`unit` (rad). `None` if there is no slipstream.
     fn slipstream(
         &mut self,
         base: &Start,

@@ -1,4 +1,4 @@
-//! Propulsion of an imported aircraft: settled thrust, thrust lag and moments.
+//! Propulsion of an imported JSBSim aircraft: settled thrust (after the engines' transient), thrust lag and moments.
 
 use greylag_sitl::plant::{PlantError, Start};
 
@@ -8,21 +8,22 @@ use greylag_model::textbook::Estimate;
 use greylag_num::{Grid, least_squares};
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
-/// RMS residual of the thrust polynomial, as a fraction of the largest thrust, above which it is reported.
+/// Root mean square residual of the thrust polynomial, as a fraction of the largest thrust, above which the residual is
+/// reported.
 const REPORTED_FROM: f64 = 0.02;
-/// Throttle before and after the step that measures the engine's lag.
+/// Throttle before and after the step with which the lag of the thrust is measured.
 const THRUST_STEP: [f64; 2] = [0.4, 0.7];
-/// RMS residual, as a fraction of the change of thrust, above which the response is reported not to be a first-order
-/// lag.
+/// Root mean square residual, as a fraction of the change of thrust, above which the step response is reported not to be that
+/// of a first-order lag.
 const LAG_REPORTED_FROM: f64 = 0.1;
 /// Observation time of the step response, s.
 const STEP_S: f64 = 20.0;
-/// Mean, amplitude and frequency (rad/s) of the throttle sine on which the lag is validated. `WAVE_S` is its duration, s.
+/// Mean, amplitude and frequency (rad/s) of the throttle sine with which the lag is validated. `WAVE_S` is its duration, s.
 const WAVE: [f64; 3] = [0.5, 0.1, 3.0];
 const WAVE_S: f64 = 10.0;
-/// Propeller torque that counts as zero, as a fraction of weight times span.
+/// Rolling moment of the propeller that counts as zero, as a fraction of weight times span.
 const NO_MOMENT: f64 = 1e-5;
-/// Offset of the thrust from the centre of gravity that counts as zero, chords.
+/// Vertical offset of the thrust from the centre of gravity that counts as zero, as a fraction of the chord.
 pub(super) const NO_ARM: f64 = 1e-3;
 /// Airspeeds of the thrust table as fractions of the cruise airspeed. `THROTTLES` has its throttle values.
 const SPEEDS: [f64; 14] = [0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.7];
@@ -30,7 +31,7 @@ const THROTTLES: [f64; 11] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 
 /// Newton metres in a pound foot.
 pub(super) const LBF_FT: f64 = 1.355_817_948_331_4;
 
-/// Propulsion parameters.
+/// Parameters of the propulsion in the model.
 pub(super) struct Propulsion {
     /// Coefficients of the settled thrust as a polynomial of throttle and airspeed.
     pub(super) thrust: Vec<Estimate>,
@@ -51,7 +52,7 @@ impl Subject<'_> {
         left_out: &mut Vec<String>,
     ) -> Result<Propulsion, PlantError> {
         let (mut rows, mut thrusts) = (Vec::new(), Vec::new());
-        // Σ l δ, Σ δ², Σ m T, Σ T² with rolling moment l, throttle δ, pitching moment m and thrust T
+        // Σ l δ, Σ δ², Σ m T, Σ T²: l is the rolling moment, δ the throttle, m the pitching moment, T the thrust
         let mut moments = [0.0; 4];
         for speed in [0.8, 1.0, 1.25] {
             for throttle in [0.0, 0.25, 0.5, 0.75, 1.0] {
@@ -101,8 +102,8 @@ impl Subject<'_> {
         })
     }
 
-    /// Settled thrust over throttle and airspeed, N at sea-level density; `None` if the engines do not hold the
-    /// commanded throttle or the airspeed changes.
+    /// Settled thrust over throttle and airspeed, N at sea-level density. `None` if the engines change the commanded throttle,
+    /// or if the airspeed changes during the measurement.
     fn thrust_table(&mut self) -> Result<Option<Grid>, PlantError> {
         let airspeeds = SPEEDS.map(|part| part * self.start.airspeed_mps);
         let mut rows = Vec::with_capacity(THROTTLES.len());
@@ -122,8 +123,8 @@ impl Subject<'_> {
         Ok(Grid::new(&THROTTLES, &airspeeds, &rows).ok())
     }
 
-    /// Time constant (s) from throttle position to thrust; `None` if the thrust has no first-order lag. `thrust` holds
-    /// the coefficients of the settled thrust.
+    /// Time constant (s) from throttle position to thrust; `None` if the thrust has no first-order lag. `thrust` contains the
+    /// coefficients of the settled thrust.
     fn thrust_lag(
         &mut self,
         thrust: &[Estimate],

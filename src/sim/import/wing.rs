@@ -1,10 +1,10 @@
-//! Measures of the wing, by which coefficients are made dimensionless.
+//! Reference dimensions of the wing (area, span, mean chord), by which coefficients are made dimensionless.
 
 use greylag_sitl::plant::Plant;
 
 use super::ImportError;
 
-/// A measure of the wing of `plant`, in the unit of its `property`.
+/// A reference dimension of the wing of `plant`, in the unit of the JSBSim property `property`. The error calls it `what`.
 pub(super) fn measure(
     plant: &mut Plant,
     what: &'static str,

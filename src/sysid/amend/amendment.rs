@@ -1,6 +1,8 @@
-//! Amends a model: tunes its coefficients, then adds effects that improve the prediction of held-out flights.
+//! Amends a model with flights: re-estimates ("tunes") its coefficients, then adds effects that improve the prediction of
+//! held-out flights, which are not fitted.
 //!
-//! An effect is a group of model terms with its coefficients, from the catalogue or from an effect file.
+//! An effect is a group of model terms with its coefficients, from the catalogue or from an effect file. A free run is an
+//! open-loop simulation of the model along a recorded flight. Its horizon is its duration.
 
 mod installation;
 mod selection;
@@ -25,24 +27,24 @@ use greylag_physics::catalogue;
 use greylag_physics::effects::{Coefficient, Description, Kind};
 use selection::{Ask, Selection};
 
-/// An effect to add, with an optional starting point.
+/// An effect to add, with optional starting values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Added {
     /// Identifier of the effect in the catalogue or in an effect file.
     pub id: String,
-    /// Starting values of the effect's coefficients, in their order; `None` for the default starting values.
+    /// Starting values of the effect's coefficients for the fit; `None` for the default starting values.
     pub start: Option<Vec<f64>>,
 }
 
 impl Added {
-    /// The effect of a `candidate` that a diagnosis found. The starting values are the estimates of the diagnosis.
+    /// The effect `candidate` of a diagnosis. The starting values are the diagnosis's estimates.
     pub fn of(candidate: &Candidate) -> Added {
         let of = |name: &str| candidate.parameters.iter().find(|p| p.name == name);
         Added::near(&candidate.id, |name| of(name).map(|p| p.value))
     }
 
-    /// The effect `id`. The function `value` returns the starting value of a coefficient from its name. The effect has no
-    /// starting values if `value` returns `None` for any coefficient.
+    /// The effect `id`. The function `value` returns the starting value of the coefficient with a given name. If it returns
+    /// `None` for any coefficient, the effect has no starting values.
     pub fn near(id: &str, value: impl Fn(&str) -> Option<f64>) -> Added {
         let coefficients = catalogue::describe(id).map(|about| about.coefficients);
         let start = coefficients.and_then(|all| all.iter().map(|c| value(c.name)).collect());
@@ -50,19 +52,21 @@ impl Added {
     }
 }
 
-/// Treatment of an effect that the held-out flights or its estimates reject.
+/// What happens to an effect that fails a check. The checks fail if the effect does not reduce the error on held-out flights by
+/// more than 1 % or its fit does not converge. They also fail if a fitted coefficient is at a bound, no coefficient differs from
+/// zero significantly, or the flights contradict each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refused {
     /// The effect is left out of the model.
     Left,
-    /// The effect stays in the model nevertheless.
+    /// The effect is added nevertheless, if its fit gave estimates.
     Kept,
 }
 
 /// Prior knowledge of the model's coefficients.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Prior {
-    /// Values and standard deviations of the model file.
+    /// Values and standard deviations in the model file.
     #[default]
     File,
     /// Only the physically possible range of each coefficient.
@@ -76,20 +80,21 @@ pub struct Options {
     pub effects: Vec<Added>,
     /// Prior on the model's coefficients.
     pub prior: Prior,
-    /// Treatment of rejected effects.
+    /// What happens to effects that fail a check.
     pub refused: Refused,
     /// Horizons of the free runs, s.
     pub horizons_s: Vec<f64>,
-    /// Whether alternatives to the model's integrator, force axes and air density are tried.
+    /// Whether alternatives to the model's integrator, force axes and air density (conventions) are tried.
     pub conventions: bool,
     /// Trims and misalignment angles that are estimated for each flight, in addition to its sensor errors.
     pub per_flight: PerFlight,
-    /// Fit of the model without added effects to the same flights ([`tune`](super::tune)); `None` to compute it.
+    /// The fit of the model without added effects to the same flights, if it is known ([`tune`](super::tune)); `None` to
+    /// compute it.
     pub tuned: Option<Fit>,
 }
 
 impl Options {
-    /// Longest horizon of the free runs at which fits are compared, s.
+    /// Fits are compared at the longest horizon up to this one, s.
     pub const JUDGED_AT_S: f64 = JUDGED_AT_S;
 }
 
@@ -108,10 +113,10 @@ impl Default for Options {
     }
 }
 
-/// Result of an amendment, with the tuned and the amended model.
+/// Result of an amendment: its report, and the tuned and the amended model.
 #[derive(Clone, Debug)]
 pub struct Amended {
-    /// The amendment's result, as written to `amend.json`.
+    /// The report, as written to `amend.json`.
     pub amendment: Amendment,
     /// The model with the accepted effects and all coefficients fitted.
     pub model: GreyBox,
@@ -120,22 +125,23 @@ pub struct Amended {
 }
 
 impl Amended {
-    /// Names of the coefficients that are zero because an added effect replaces their term. Each name is paired with the
-    /// identifier of this effect.
+    /// Names of the coefficients that are zero because an added effect replaces their model term. Each name is paired with the
+    /// identifier of that effect.
     pub fn dropped(&self) -> Vec<(String, &'static str)> {
         dropped(&self.tuned, &self.model)
     }
 }
 
-/// Names of the coefficients of `before` whose term is replaced by an effect of `after` and by no effect of `before`. Each
-/// name is paired with the identifier of this effect.
+/// Names of the coefficients of `before` whose model term is replaced by an effect of `after` and by no effect of `before`.
+/// Each name is paired with the identifier of that effect.
 fn dropped(before: &GreyBox, after: &GreyBox) -> Vec<(String, &'static str)> {
     let still = |name: &str| before.replaced(name).is_none();
     let named = before.coefficients().iter().filter(|c| still(&c.name));
     named.filter_map(|c| Some((c.name.clone(), after.replaced(&c.name)?))).collect()
 }
 
-/// Fits `model` with the effects of `options` to `flights`. Free runs over `held_out` decide which effects are accepted.
+/// Fits `model` with the effects of `options` to `flights`. Free runs along the flights `held_out` decide which effects are
+/// accepted.
 ///
 /// `progress` receives the stages and may cancel.
 ///
@@ -161,8 +167,8 @@ pub fn amend(
     Ok(amended)
 }
 
-/// Amends `model` with `flights` that are already corrected with the constants in the model's file. The `answer` of the
-/// result is empty.
+/// Amends `model` from `flights`. They are already corrected for the sensor errors and misalignment that the model's file
+/// states. The `answer` of the result is empty.
 fn of_right(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -226,25 +232,27 @@ fn of_right(
     Ok(Amended { amendment, model: fit.model, tuned: tuned.model })
 }
 
-/// Horizon at which the fit is compared with the model as given, s. `given` are the held-out scores of the model as given.
+/// Horizon at which the amended model is compared with the model as given, s. `given` are the scores of the model as given on
+/// the held-out flights.
 fn compared_at(prior: Prior, given: &[HorizonScore]) -> Option<f64> {
     match prior {
         Prior::File => judge::repeated_at(given),
-        // without a prior, the given coefficients are guesses: a single run at the horizon is enough to replace them
+        // without a prior the given coefficients are guesses, and a single run at the horizon suffices to replace them
         Prior::Bounds => judge::judged_at(given),
     }
 }
 
-/// Flights for the fit, corrected with the constants in the model's file. `asked` are the constants to estimate for each
-/// flight.
+/// The flights for the fit after correction with the constants in the model's file, the constants `asked` that are estimated for
+/// each flight, and notes on both.
 struct Right {
     flights: Vec<Reconstruction>,
     asked: PerFlight,
     notes: Vec<String>,
 }
 
-/// Corrects `flights` for the misalignment and the sensor errors in the file of `model`, unless the fit estimates the
-/// misalignment. If the file has trims of any of `flights`, trims are estimated for each flight.
+/// Corrects `flights` for the misalignment of the sensor axes and the sensor errors that the file of `model` states, unless the
+/// fit estimates the misalignment. If the file states trims (coefficient offsets of a single flight) for any of `flights`, trims
+/// are estimated for every flight.
 fn right(model: &GreyBox, flights: &[Reconstruction], mut asked: PerFlight) -> Right {
     let mut notes = Vec::new();
     let (flights, named) = match asked.askew_deg {
@@ -278,18 +286,19 @@ pub(super) fn joined(model: &mut GreyBox, added: &Added) -> Result<(), AmendErro
     Ok(model.join_most(&added.id, &start)?)
 }
 
-/// Default starting values of an effect. If none are listed, each value is zero or the bound nearest to zero.
+/// Default starting values of an effect's coefficients. If the effect lists none, each value is zero, or the bound nearest to
+/// zero.
 fn usual_start(about: &Description) -> Vec<f64> {
     let starts = about.entry.map_or(&[][..], |e| e.starts);
     let nearest = |c: &Coefficient| 0.0_f64.clamp(c.bounds.0, c.bounds.1);
-    // an effect file lists its default values first; the catalogue lists typical values in the middle
+    // the first entry in the list of an effect file is the default; in the catalogue, the middle entry is typical
     let own = Kind::from_id(about.id).is_some_and(|kind| kind.written().is_some());
     let listed = starts.get(if own { 0 } else { starts.len() / 2 }).map(|s| s.to_vec());
     listed.unwrap_or_else(|| about.coefficients.iter().map(nearest).collect())
 }
 
-/// Notes on an amendment of `model`: on the fit, on coefficients that are not fitted, on contradictions between flights,
-/// and on estimates that contradict their bounds or priors.
+/// Notes on an amendment of `model`: on the fit, on coefficients that are not fitted, on contradictions between flights, on
+/// estimates at their bounds, and on estimates that contradict their priors.
 fn notes(model: &GreyBox, tuned: &GreyBox, fit: &Fit) -> Vec<String> {
     let mut notes = fit.notes.clone();
     notes.extend(
@@ -313,7 +322,7 @@ fn notes(model: &GreyBox, tuned: &GreyBox, fit: &Fit) -> Vec<String> {
     notes
 }
 
-/// Splits a flight into two parts: the first two thirds for the fit, and the last third to be held out.
+/// Splits a flight into its first two thirds, for the fit, and its last third, which is held out.
 pub fn split(flight: &Reconstruction) -> [Reconstruction; 2] {
     let total: usize = flight.segments.iter().map(|s| s.instants.len()).sum();
     let mut left = total * 2 / 3;

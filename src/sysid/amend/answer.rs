@@ -1,4 +1,6 @@
 //! Short answers (summaries) of an amendment, of a diagnosis, and of a comparison of models before and after an amendment.
+//! An amendment re-estimates ("tunes") the coefficients of a model and adds effects that it lacks. A diagnosis finds these
+//! effects. Errors are those of free runs, simulations from recorded states.
 
 use std::path::{Path, PathBuf};
 
@@ -16,8 +18,8 @@ use crate::flight_path::reconstruction::{Instant, Reconstruction};
 use greylag_model::GreyBox;
 use greylag_physics::catalogue;
 
-/// The answer of an amendment, from the held-out errors of three models: as given, tuned, and with the added effects.
-/// `seen` states whether the held-out flights were also fitted.
+/// The answer of an amendment, from the errors of three models on held-out flights: as given, tuned, and with the added
+/// effects. `seen` states whether the held-out flights were also fitted.
 pub fn answer(story: &Amendment, seen: Seen) -> Answer {
     let joined: Vec<_> = story.effects.iter().filter(|e| e.joined).collect();
     let effects = joined.iter().filter_map(|e| {
@@ -39,8 +41,8 @@ pub fn answer(story: &Amendment, seen: Seen) -> Answer {
     })
 }
 
-/// Whether the flights `held_out` are among the flights `fitted`. Both are reconstructions before corrections. Names do not
-/// suffice: logs in two folders can have the same name, and both parts of a split flight have the name of the flight.
+/// Whether the flights `held_out` are among the flights `fitted`. Names do not suffice: logs in two folders can have the same
+/// name, and both parts of a split flight have the name of the flight. Both lists must be uncorrected reconstructions.
 pub fn seen(fitted: &[Reconstruction], held_out: &[Reconstruction]) -> Seen {
     let (mut same, mut after) = (0, false);
     for held in held_out {
@@ -56,7 +58,7 @@ fn first(flight: &Reconstruction) -> Option<&Instant> {
     flight.segments.iter().find_map(|s| s.instants.first())
 }
 
-/// Whether two reconstructions are of the same part of the same flight: equal length and equal first sample.
+/// Whether two reconstructions are of the same part of the same flight. They then have equal length and equal first samples.
 fn equal(one: &Reconstruction, other: &Reconstruction) -> bool {
     let count = |f: &Reconstruction| f.segments.iter().map(|s| s.instants.len()).sum::<usize>();
     let begin = first(one).zip(first(other));
@@ -64,18 +66,18 @@ fn equal(one: &Reconstruction, other: &Reconstruction) -> bool {
         && begin.is_some_and(|(a, b)| a.time_s == b.time_s && a.state == b.state)
 }
 
-/// Whether `one` ends before `other` begins, on the log's clock.
+/// Whether `one` ends before `other` begins, by the times in the log.
 fn precedes(one: &Reconstruction, other: &Reconstruction) -> bool {
     let last = one.segments.iter().rev().find_map(|s| s.instants.last());
     last.zip(first(other)).is_some_and(|(a, b)| a.time_s < b.time_s)
 }
 
-/// The answer of a diagnosis, and the model tuned to the flights of the diagnosis by equation error.
+/// The answer of a diagnosis, and the model with coefficients tuned to the flights of the diagnosis by equation error.
 #[derive(Clone, Debug)]
 pub struct Diagnosed {
     /// The model with tuned coefficients and without added effects.
     pub tuned: GreyBox,
-    /// Reduction of the free-run error on the flights of the diagnosis, by tuning and by all asserted effects together.
+    /// Summary: how much tuning, and all asserted effects together, reduce the free-run error on the flights of the diagnosis.
     pub answer: Answer,
 }
 
@@ -83,7 +85,7 @@ pub struct Diagnosed {
 /// flights of the diagnosis.
 ///
 /// # Errors
-/// An effect cannot be added to the model, or a flight cannot be resampled.
+/// If an effect cannot be added to the model, or a flight cannot be resampled.
 pub fn diagnosed(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -127,7 +129,7 @@ pub fn diagnosed(
     Ok(Diagnosed { tuned, answer })
 }
 
-/// Estimate of a coefficient, from a fit or read from `amend.json`.
+/// Estimate of a coefficient, from a fit or from the file `amend.json`.
 #[derive(Clone, Debug, Deserialize)]
 struct Known {
     name: String,
@@ -144,7 +146,7 @@ impl Known {
     }
 }
 
-/// The most significant coefficient of the effect `id` among `known`.
+/// The coefficient of the effect `id` that is most significantly different from zero; `None` if `known` has none.
 fn decisive(id: &str, description: &str, known: impl Iterator<Item = Known>) -> Option<Decisive> {
     let of = |p: Known| {
         let (effect, coefficient) = p.name.split_once('.')?;
@@ -170,7 +172,7 @@ fn unit(id: &str, coefficient: &str) -> &'static str {
     of.map_or("", |c| c.unit).trim_matches('-')
 }
 
-/// Origin of an amended model, read from the `amend.json` beside it.
+/// Origin of an amended model, read from the file `amend.json` in the model's folder.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Origin {
     /// Name of the model before the amendment.
@@ -194,24 +196,24 @@ struct Log {
 }
 
 impl Origin {
-    /// The amendment beside the model file `model`; `None` if there is none, or if the model was not made from
-    /// `before`.
+    /// Reads the `amend.json` in the folder of the model file `model`. `None` if there is none, or if it states another model
+    /// before the amendment than `before`.
     pub fn beside(model: &Path, before: &GreyBox) -> Option<Origin> {
         let text = std::fs::read_to_string(model.parent()?.join(STORY)).ok()?;
         let origin: Origin = serde_json::from_str(&text).ok()?;
         (origin.model == before.name).then_some(origin)
     }
 
-    /// The model `before` with the coefficients as tuned in the amendment, without added effects. `None` if `before` lacks
-    /// one of these coefficients.
+    /// The model `before` with the coefficients that the amendment tuned without added effects. `None` if `before` lacks one of
+    /// these coefficients.
     pub fn tuned(&self, before: &GreyBox) -> Option<GreyBox> {
         let mut tuned = before.clone();
         let set = |p: &Known| tuned.set_coefficient(&p.name, p.value);
         self.tuned.iter().all(set).then_some(tuned)
     }
 
-    /// The answer of the comparison `c` between the model before the amendment and the amended model. `tuned` holds the
-    /// free-run errors of the tuned model without effects, `logs` the paths of the compared flights.
+    /// The answer of the comparison `c`, whose models are that before the amendment and the amended one. `tuned` holds the
+    /// free-run errors of the tuned model without added effects. `logs` holds the paths of the logs of the comparison.
     pub fn answer(&self, c: &Comparison, tuned: &[HorizonScore], logs: &[PathBuf]) -> Answer {
         let stage =
             |k: usize, way| Stage { way, model: &c.models[k].name, scores: &c.models[k].free_run };
@@ -276,7 +278,7 @@ mod tests {
         assert_eq!(seen(&all, &all), Seen::Of(2));
         let [begin, end] = split(&a);
         assert_eq!(seen(&[begin], &[end]), Seen::LastThird);
-        // a log of the same name in another folder
+        // another log of the same name, for instance in another folder, is not the fitted one
         assert_eq!(seen(&all, &[flight("a.csv", 0.3)]), Seen::Of(0));
     }
 }

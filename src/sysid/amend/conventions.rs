@@ -1,4 +1,7 @@
 //! Modelling conventions: integrator, force axes and air density. No coefficient can compensate for a wrong convention.
+//!
+//! A convention is replaced by its alternative if the flights support this. The evidence comes from the fitted flights and
+//! from held-out flights, which no fit uses. In a free run the model is simulated with the recorded controls.
 
 use serde::Serialize;
 
@@ -8,7 +11,8 @@ use greylag_model::{GreyBox, Integrator};
 use greylag_physics::atmosphere::Density;
 use greylag_physics::rigid_body::ForceAxes;
 
-/// Number of standard errors of the cost difference beyond which two fits differ significantly (two-sided 95 %, Vuong 1989).
+/// Two fits differ significantly if the difference of their costs exceeds this number of standard errors (two-sided 95 %,
+/// Vuong 1989).
 const CLEARLY: f64 = 1.96;
 /// Relative change of the held-out error that counts as large.
 const MUCH: f64 = 0.1;
@@ -17,9 +21,9 @@ const MUCH: f64 = 0.1;
 /// output-error fit.
 ///
 /// The number is the mean decrease of the shots' costs divided by its standard error (Vuong 1989). The total decrease is
-/// first reduced by 2 for each additional coefficient (Akaike). The weights estimated by a fit favour this fit. The cost of
-/// a shot is therefore the mean of two costs, with the weights of either fit. The result is zero if the fits have fewer
-/// than three shots in common.
+/// first reduced by 2 for each additional coefficient (Akaike). Each fit has estimated weights, which favour this fit. The
+/// cost of a shot is therefore the mean of its costs with the weights of `fit` and with those of `other`. The result is zero
+/// if the fits have fewer than three shots in common.
 pub(super) fn closer(fit: &Fit, other: &Fit) -> f64 {
     let cost = |left: &Left| -> f64 {
         let weigh = |squares: &[f64; 8], weights: &[f64; 8]| -> f64 {
@@ -70,7 +74,7 @@ impl Convention {
         }
     }
 
-    /// The convention of `model`, spelled as in a model file; "constant" for a stated air density.
+    /// The convention of `model`, spelled as in a model file. For a constant air density the result is "constant".
     pub fn of(self, model: &GreyBox) -> &'static str {
         match self {
             Convention::Integrator => match model.integrator {
@@ -89,10 +93,10 @@ impl Convention {
     }
 
     /// Whether the alternative is adopted. `closer` is the number of standard errors by which the alternative fits the
-    /// shots better. `error` holds the held-out errors without and with the alternative.
+    /// shots better. `error` holds the errors on held-out flights without and with the alternative.
     ///
-    /// Integrator and axes are choices of a simulator or an author: their alternatives need positive evidence. Air density
-    /// decreases with height: the standard atmosphere is adopted unless the data contradict it.
+    /// An alternative integrator or alternative axes need positive evidence, because both are choices of the model's author.
+    /// Real air density decreases with height. The standard atmosphere is therefore adopted unless the data contradict it.
     pub(super) fn is_borne_out(self, closer: f64, error: [f64; 2]) -> bool {
         let fall = 1.0 - error[1] / error[0];
         match self {
@@ -138,7 +142,7 @@ pub struct Tried {
     /// Held-out free-run errors without and with the alternative, at the longest horizon up to 5 s that a run reaches, after a
     /// refit of all coefficients. NaN if there is no such horizon or the fit fails.
     pub error: [f64; 2],
-    /// Number of standard errors by which the alternative fits the fitted flights better; NaN if the fit fails.
+    /// Number of standard errors by which the alternative fits the shots better; NaN if the fit fails.
     pub closer: f64,
     /// Whether the amended model adopts the alternative.
     pub kept: bool,

@@ -1,4 +1,6 @@
 //! Files of an amendment: the new text of the model file, and the result as JSON.
+//!
+//! An amendment refits a model to logs and adds effects that it lacked.
 
 use std::path::{Path, PathBuf};
 
@@ -52,7 +54,7 @@ pub const MODEL: &str = "model.toml";
 /// File name of the amendment's result.
 pub const STORY: &str = "amend.json";
 
-/// Error of making an amended model's files.
+/// Reason why the files of an amended model cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum DocumentError {
     /// A file of the original model cannot be read.
@@ -60,7 +62,7 @@ pub enum DocumentError {
     Read {
         /// Path of the unreadable file.
         path: PathBuf,
-        /// The system's error.
+        /// The operating system's error.
         source: std::io::Error,
     },
     /// The model file cannot be edited.
@@ -95,7 +97,7 @@ pub struct Original {
     pub path: PathBuf,
     /// Text of the model file.
     pub text: String,
-    /// File name of its airframe.
+    /// File name of the airframe that the model file names.
     pub airframe: String,
     /// Text of the airframe file.
     pub airframe_text: String,
@@ -105,7 +107,7 @@ impl Original {
     /// Reads the model file at `path` with its airframe.
     ///
     /// # Errors
-    /// One of them cannot be read.
+    /// If one of them cannot be read.
     pub fn read(path: &Path) -> Result<Original, DocumentError> {
         let read = |path: &Path| {
             let unread = |source| DocumentError::Read { path: path.into(), source };
@@ -125,12 +127,12 @@ impl Original {
     }
 }
 
-/// Name and text of each file of an amended model: airframe, effects, model, result. `logs` were fitted, `hold_out` are the
-/// held-out logs.
+/// Name and text of each file of an amended model: airframe, effects, model, result. `logs` are the fitted logs, `hold_out` the
+/// held-out ones.
 ///
 /// # Errors
-/// The original is no model file or has a learned residual, the result holds a number that JSON cannot represent, or two
-/// files would have the same name.
+/// If the original is no model file, if the model has a learned residual, if the result holds a number that JSON cannot
+/// represent, or if two files would have the same name.
 pub fn files(
     original: &Original,
     before: &GreyBox,
@@ -150,7 +152,7 @@ pub fn files(
     Ok(files)
 }
 
-/// Fails if `model` has a learned residual: the written model would name a file that is not written.
+/// Fails if `model` has a learned residual, because the written model would name a residual file that is not written.
 fn without_residual(model: &GreyBox) -> Result<(), DocumentError> {
     match &model.residual {
         Some(_) => Err(DocumentError::Residual { model: model.name.clone() }),
@@ -158,7 +160,7 @@ fn without_residual(model: &GreyBox) -> Result<(), DocumentError> {
     }
 }
 
-/// Fails if two of `files` have the same name: one would replace the other.
+/// Fails if two of `files` have the same name, because one would replace the other.
 fn distinct(files: &[(String, String)]) -> Result<(), DocumentError> {
     let mut names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
     names.sort_unstable();
@@ -203,7 +205,7 @@ fn edit(before: &GreyBox, amended: &Amended, logs: &[Hashed], airframe: String) 
     }
 }
 
-/// Name of an effect's file beside a model.
+/// File name of an effect in the folder of its model.
 pub fn effect_file(effect: &Written) -> String {
     format!("{}.toml", effect.about.id)
 }
@@ -213,8 +215,9 @@ fn short(log: &Hashed) -> String {
     format!("{name} (sha256 {})", &log.sha256[..PREFIX])
 }
 
-/// The first difference between `read` and `meant`, in words: a convention, the number of coefficients, constants of the
-/// installation or the flights, or a coefficient that differs in any bit. `None` if the models are equal.
+/// The first difference between `read` and `meant`, in words: a model structure option such as the integrator, the number of
+/// coefficients, constants of the installation or of flights, or a coefficient with other bits. `None` if there is no
+/// difference.
 pub fn differs(read: &GreyBox, meant: &GreyBox) -> Option<String> {
     if let Some(other) = Convention::ALL.into_iter().find(|c| c.of(read) != c.of(meant)) {
         return Some(other.key().join("."));

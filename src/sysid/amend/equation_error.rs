@@ -1,4 +1,5 @@
-//! Equation-error fit in weak form. It converges from poor values and provides starting values for the output-error fit.
+//! Equation-error fit in weak form: the equations of motion are integrated over short windows against a smooth kernel, so that
+//! no data are differentiated. The fit converges from poor initial values and provides starting values for the output-error fit.
 
 use std::cmp::Ordering;
 
@@ -10,22 +11,22 @@ use super::parameters::{self, Free};
 use crate::weak_form::windows;
 use greylag_model::GreyBox;
 
-/// Number of fitted channels: three forces (NaN without accelerometers) and three moments.
+/// Number of fitted channels: three forces (unknown without accelerometers) and three moments.
 const CHANNELS: usize = 6;
 /// Largest number of iterations of one search.
 const ITERATIONS: usize = 5;
-/// Number of iterations from each starting point, after which the best starting point is selected.
+/// Number of iterations from each of several starting points. The best result is then continued.
 const TRIAL: usize = 2;
 /// Largest number of starting points. Two effect files with three shape constants each can give thousands of combinations.
 const MOST_STARTS: usize = 256;
 /// The search ends if the predicted decrease of the weighted sum of squares is at most this. A change by a tenth of a
 /// standard deviation gives this decrease.
 const COST_TOLERANCE: f64 = 0.01;
-/// Number of independent samples for which a window counts: windows overlap by half.
+/// Number of independent samples for which a window counts. It is one half, because windows overlap by half.
 const INDEPENDENT_FRACTION: f64 = 0.5;
 
-/// Estimates the free coefficients from forces and moments in weak form. The search continues from the best of several
-/// starting points.
+/// Estimates the free coefficients of `model` from forces and moments in weak form. Of several starting points, the best is
+/// continued.
 pub(super) fn start(model: &GreyBox, free: &[Free], flights: &[Flight]) -> Vec<f64> {
     let starts = starts(free);
     let trials = if starts.len() > 1 { TRIAL } else { 0 };
@@ -36,9 +37,9 @@ pub(super) fn start(model: &GreyBox, free: &[Free], flights: &[Flight]) -> Vec<f
     search(model, free, flights, theta, ITERATIONS).1
 }
 
-/// Starting points: the prior means, with every combination of the catalogue's starting values for the shape constants of
-/// added effects. Shape constants are coefficients in which the model is nonlinear. A constant that would lead to more than
-/// [`MOST_STARTS`] combinations keeps its prior mean.
+/// Starting points of the search: the prior means, with every combination of the catalogue's starting values for the shape
+/// constants of added effects. Shape constants are the coefficients in which an effect is nonlinear. A constant that would lead
+/// to more than [`MOST_STARTS`] combinations keeps its prior mean.
 fn starts(free: &[Free]) -> Vec<Vec<f64>> {
     let mut starts: Vec<Vec<f64>> = vec![free.iter().map(|f| f.prior).collect()];
     for (k, f) in free.iter().enumerate().filter(|(_, f)| f.added && !f.linear) {
@@ -54,8 +55,8 @@ fn starts(free: &[Free]) -> Vec<Vec<f64>> {
     starts
 }
 
-/// All combinations of `starts` with `values` at the index `place`. Returns `starts` unchanged if there are fewer than two
-/// values, or if there would be more than [`MOST_STARTS`] combinations.
+/// Combines each of `starts` with each of `values` as its element `place`. Returns `starts` unchanged if there are fewer than
+/// two values or if there would be more than [`MOST_STARTS`] combinations.
 fn combined(starts: Vec<Vec<f64>>, place: usize, values: &[f64]) -> Vec<Vec<f64>> {
     if values.len() < 2 || starts.len() * values.len() > MOST_STARTS {
         return starts;
@@ -70,7 +71,7 @@ fn replaced(values: &[f64], place: usize, value: f64) -> Vec<f64> {
     values
 }
 
-/// Residuals (measured − predicted) of the channels over all flights, concatenated.
+/// Residuals (measured minus predicted) of all channels and flights in one list, with the channel of each.
 struct Residuals {
     values: Vec<f64>,
     channel: Vec<usize>,
@@ -91,7 +92,8 @@ fn residuals(model: &GreyBox, flights: &[Flight]) -> Residuals {
     all
 }
 
-/// Gauss–Newton search from `theta`. Returns the smallest misfit and the coefficients that give it.
+/// Gauss–Newton search from the coefficients `theta`. Returns the smallest misfit that was found and the coefficients that give
+/// it.
 fn search(
     model: &GreyBox,
     free: &[Free],
@@ -128,8 +130,8 @@ fn weights(r: &Residuals) -> [f64; CHANNELS] {
     std::array::from_fn(|k| 1.0 / mean_square(r, k))
 }
 
-/// Mean square of a channel's residuals. It is 1 if no residual is finite: the channel then adds zero to a sum of
-/// logarithms.
+/// Mean square of a channel's residuals. It is 1 if no residual is finite; the channel then adds zero to the sum of logarithms
+/// in the misfit.
 fn mean_square(r: &Residuals, channel: usize) -> f64 {
     let own = r.values.iter().zip(&r.channel).filter(|(x, c)| **c == channel && x.is_finite());
     let (sum, n) = own.fold((0.0, 0.0), |(s, n), (x, _)| (s + x * x, n + 1.0));
@@ -139,10 +141,11 @@ fn mean_square(r: &Residuals, channel: usize) -> f64 {
 /// Misfit between the flights and the predictions of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Misfit {
-    /// Number of channels without a finite residual. Unmeasured channels count for every set of coefficients. A larger
-    /// number means that predictions are NaN: such a misfit is worse, whatever its `cost`.
+    /// Number of channels without a finite residual. Unmeasured channels are included and are the same for all coefficients. If
+    /// the number is larger, predictions are NaN. A misfit with the larger number is therefore the worse one, whatever its
+    /// `cost`.
     missing: usize,
-    /// Concentrated negative log-likelihood: Σ ln of the channels' mean squares.
+    /// Concentrated negative log-likelihood: sum of the logarithms of the channels' mean square residuals.
     cost: f64,
 }
 
@@ -162,7 +165,7 @@ fn misfit(r: &Residuals) -> Misfit {
     }
 }
 
-/// A Gauss–Newton step.
+/// A step of the Gauss–Newton search.
 struct Step {
     /// Change of each free coefficient.
     change: DVector<f64>,

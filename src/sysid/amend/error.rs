@@ -1,13 +1,13 @@
-//! Errors of an amendment.
+//! Errors of an amendment: of the fit of a model to flights, and of the addition of effects to the model.
 
 use crate::progress::Cancelled;
 use crate::weak_form::prepared::ClockError;
 use greylag_model::JoinError;
 
-/// Error of an amendment.
+/// Reason why an amendment failed.
 #[derive(Debug, thiserror::Error)]
 pub enum AmendError {
-    /// An effect cannot join the model.
+    /// An effect cannot be added to the model.
     #[error("cannot amend the model: {0}")]
     Effect(#[from] JoinError),
     /// The sampling interval of a flight is not usable.
@@ -32,13 +32,13 @@ pub enum AmendError {
          or cut one into parts with `greylag logs convert`"
     )]
     TooFewFlights {
-        /// Number of flights that are long enough to be predicted. If there are too few flights of any length, the number
-        /// of all flights.
+        /// Number of flights that are long enough to be predicted. If the number of all flights is already too small, that
+        /// number.
         flights: usize,
         /// Smallest number of flights for the cross-validation.
         needed: usize,
     },
-    /// Two flights have the same name. The model's file identifies the constants of a flight by the flight's name.
+    /// Two flights have the same name. Constants of single flights are stored in the model file under the flight's name.
     #[error(
         "cannot estimate trims or axes for each flight: two of them are called {name}, and the model's file keeps these constants by \
          name; rename one of the logs"
@@ -47,7 +47,7 @@ pub enum AmendError {
         /// The name of both flights.
         name: String,
     },
-    /// No coefficient is free.
+    /// No coefficient may be changed by the fit.
     #[error(
         "cannot fit {model}: every coefficient is zero without a stated sd, so none may change; give \
          the model file an sd for those in doubt"
@@ -56,7 +56,7 @@ pub enum AmendError {
         /// Name of the model.
         model: String,
     },
-    /// The flights do not excite any free coefficient.
+    /// The flights give no information on any coefficient that the fit may change.
     #[error(
         "cannot fit {model}: these flights determine no coefficient better than the model file does, \
          because the aircraft hardly leaves trim; fly doublets or multisines on aileron, elevator and \
@@ -66,7 +66,7 @@ pub enum AmendError {
         /// Name of the model.
         model: String,
     },
-    /// The search did not converge.
+    /// The iterations of the fit did not converge.
     #[error(
         "cannot fit {model}: the search had not settled after {iterations} iterations, the last \
          change being {change:.2} standard deviations of {parameter}; leave out flights in which the \
@@ -75,14 +75,14 @@ pub enum AmendError {
     NotConverged {
         /// Name of the model.
         model: String,
-        /// Number of iterations made.
+        /// Number of iterations that were made.
         iterations: usize,
-        /// Largest change of a parameter in the last iteration, in its standard deviations.
+        /// Largest change of a parameter in the last iteration, in standard deviations of the parameter.
         change: f64,
         /// The parameter with the largest change.
         parameter: String,
     },
-    /// Free runs diverge from the flights too early for a fit.
+    /// Free runs (open-loop simulations) of the model diverge from the flights too early for a fit.
     #[error(
         "cannot fit {model}: its free runs leave the flights within {reach_s:.1} s, too early to \
          learn from; begin with a model closer to this aircraft, or check signs and units of the log"
@@ -102,8 +102,8 @@ pub enum AmendError {
         /// Name of the model.
         model: String,
     },
-    /// The progress listener cancelled the amendment.
-    // not transparent: `Cancelled` must appear in the chain of error sources
+    /// The amendment was cancelled.
+    // the error is not declared `transparent`, because `Cancelled` must appear in the chain of error sources
     #[error("cancelled")]
     Cancelled(#[from] Cancelled),
 }

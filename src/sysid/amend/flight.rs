@@ -1,4 +1,4 @@
-//! A flight prepared for a fit, with priors for the sensor errors that remain after reconstruction.
+//! A flight prepared for a fit, with priors for the sensor errors that remain after flight-path reconstruction.
 
 use crate::diagnose::search::clocks::{BLURRED, Doubt};
 use crate::flight_path::reconstruction::Reconstruction;
@@ -10,8 +10,8 @@ use crate::weak_form::prepared::{ClockError, Prepared};
 pub(super) const SENSORS: usize = 8;
 /// Index of the actuators' delay (s) among the sensor constants.
 pub(super) const SKEW: usize = 0;
-/// Index of the state to which each sensor constant between delay and blur is added. The constant of the airspeed is a
-/// relative error.
+/// Index of the state to which each of the sensor constants between delay and blur is added as an error. The airspeed's
+/// constant is a relative error, which is multiplied by the airspeed first.
 pub(super) const OFFSETS: [usize; SENSORS - 2] = [2, 3, 4, 5, 6, 7];
 /// Index of the actuators' blur, the last sensor constant. A recorded deflection may be a weighted mean over time. The blur
 /// is half the variance of these weights in time, in squared sampling intervals.

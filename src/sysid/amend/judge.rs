@@ -1,4 +1,6 @@
-//! Acceptance of an effect from free runs over held-out flights and from the estimates of its coefficients.
+//! Acceptance of an effect, a group of terms that an amendment adds to a model. The effect must reduce the error of free runs
+//! (simulations from recorded states) over held-out flights, which the fit did not use. Its fitted coefficients must be
+//! plausible.
 
 use super::amendment::{Added, Refused};
 use super::error::AmendError;
@@ -10,32 +12,32 @@ use super::result::{AddedEffect, Parameter};
 use crate::compare::{HorizonScore, free_run};
 use greylag_model::GreyBox;
 
-/// Longest horizon of the free runs at which fits are compared, s.
+/// Longest horizon (duration) of the free runs at which fits are compared, s.
 pub const JUDGED_AT_S: f64 = 5.0;
-/// Smallest relative decrease of the held-out error for which an effect is accepted.
+/// Smallest relative decrease of the error over held-out flights for which an effect is accepted.
 pub(super) const IMPROVED: f64 = 0.01;
-/// An effect that reduces the held-out error below this fraction of the previous error is accepted although the search has
-/// not converged with it. Convergence may need further effects.
+/// An effect that reduces the error over held-out flights below this fraction of the error without it is accepted even if
+/// its fit did not converge. Convergence may need further effects.
 pub const ACCEPTED_UNCONVERGED: f64 = 0.5;
-/// Half width of a 95 % interval in standard deviations. At least one coefficient of an effect must differ from zero by
-/// this number of standard deviations.
+/// Half width of a 95 % interval in standard deviations. At least one coefficient of an effect must differ from zero by this
+/// many standard deviations.
 pub(super) const CLEAR: f64 = 1.96;
-/// Replaces `CLEAR` for effects with more than three coefficients. Among many coefficients, one can exceed `CLEAR` by
-/// chance.
+/// Takes the place of `CLEAR` for effects with more than three coefficients, because among many coefficients one can exceed
+/// `CLEAR` by chance.
 const CLEAR_OF_MANY: f64 = 3.0;
-/// Smaller scaled errors of free runs are raised to this value before the logarithm is taken.
+/// Smallest scaled error of a free run in a logarithm. Smaller errors are replaced by this value.
 const LEAST_ERROR: f64 = 1e-12;
-/// A flight contradicts the common estimate if its own estimate differs from it by more than this number of standard
-/// deviations, and by more than [`DISAGREE_SHARE`].
+/// A flight contradicts the estimate from all flights if its own estimate differs by more than this number of standard
+/// deviations of the difference, and by more than the relative difference [`DISAGREE_SHARE`].
 const DISAGREE: f64 = 4.0;
-/// Objection to an effect that cannot be validated, because no free run over held-out flights is long enough.
+/// Objection to an effect that cannot be judged, because no held-out flight is long enough for a free run.
 const UNJUDGED: &str =
     "no flight that the fit did not see is long enough for a free run; hold out a longer one";
-/// A flight contradicts the common estimate only if the relative difference of its own estimate exceeds this.
+/// Relative difference from the estimate from all flights that a contradicting flight must exceed.
 const DISAGREE_SHARE: f64 = 0.3;
 
 impl AddedEffect {
-    /// The record of the requested effect `id` before its fit.
+    /// The record of the requested effect `id`, as it is before the fit.
     pub fn asked_for(id: &str) -> AddedEffect {
         let about = parameters::describe(id).map(|(about, _)| about);
         AddedEffect {
@@ -50,7 +52,7 @@ impl AddedEffect {
 
 /// Evaluation of fits by free runs over held-out flights.
 pub struct Judge<'a> {
-    /// Held-out flights.
+    /// The held-out flights, which no fit used.
     pub test: &'a [Flight],
     /// Horizons of the free runs, s. Fits are compared at the longest one up to `JUDGED_AT_S`.
     pub horizons_s: &'a [f64],
@@ -60,20 +62,19 @@ pub struct Judge<'a> {
 pub type Kept = (Fit, Vec<HorizonScore>);
 
 impl Judge<'_> {
-    /// Free-run errors of `model` over the held-out flights, with one entry for each horizon.
+    /// Errors of `model` in free runs over the held-out flights, one entry for each horizon.
     pub fn scores(&self, model: &GreyBox) -> Vec<HorizonScore> {
         let flights: Vec<_> = self.test.iter().map(|f| f.prepared.clone()).collect();
         let (runs, _) = free_run::fly(model, &flights, self.horizons_s);
         self.horizons_s.iter().map(|h| runs.score(*h)).collect()
     }
 
-    /// Mean of ln(scaled error of `before` / scaled error of `after`) over all held-out free runs of `horizon_s` (s), and
-    /// its standard error.
+    /// Mean of ln(error of `before` / error of `after`) over all free runs of `horizon_s` (s) over held-out flights, and its
+    /// standard error. `before` and `after` are models. `None` if fewer than two runs reach the horizon.
     ///
-    /// Because of the logarithm, a single diverged run does not outweigh all others. Runs overlap if they are longer than
-    /// the time between their starts. The standard error is increased accordingly.
-    ///
-    /// `None` if fewer than two runs reach the horizon.
+    /// Because of the logarithm, a single diverged run does not outweigh all others. If runs are longer than the time between
+    /// their starts, they overlap and are correlated. The standard error is therefore multiplied by the square root of the
+    /// number of overlapping runs.
     pub fn decrease(&self, horizon_s: f64, before: &GreyBox, after: &GreyBox) -> Option<[f64; 2]> {
         let flights: Vec<_> = self.test.iter().map(|f| f.prepared.clone()).collect();
         let errors =
@@ -85,8 +86,9 @@ impl Judge<'_> {
         (less.len() > 1).then(|| mean_with_error(&less)).map(|[mean, e]| [mean, e * overlap.sqrt()])
     }
 
-    /// Decides on the effect `added` from its fit `fitted` and the held-out scores `before` of the model without it.
-    /// Returns the effect's record, and the fit with its scores if the effect is accepted.
+    /// Decides on the effect `added`. `fitted` is its fit, and `before` are the errors of the model without it over the held-out
+    /// flights. `refused` states whether an effect with objections is added nevertheless. Returns the effect's record and, if
+    /// the effect is added, the fit with its errors.
     pub fn verdict(
         &self,
         added: &Added,
@@ -141,12 +143,12 @@ fn failed(why: &AmendError) -> bool {
     matches!(why, AmendError::NotConverged { .. } | AmendError::Singular { .. })
 }
 
-/// The scaled free-run error at the longest horizon up to [`JUDGED_AT_S`] that a run reaches.
+/// The scaled free-run error at the longest horizon up to [`JUDGED_AT_S`] that any run reaches; `None` if there is none.
 pub fn judged(scores: &[HorizonScore]) -> Option<f64> {
     judge_of(scores).map(|s| s.rmse_scaled)
 }
 
-/// The longest horizon up to [`JUDGED_AT_S`] that a run reaches, s.
+/// The longest horizon up to [`JUDGED_AT_S`] that any run reaches, s.
 pub fn judged_at(scores: &[HorizonScore]) -> Option<f64> {
     judge_of(scores).map(|s| s.horizon_s)
 }
@@ -167,19 +169,20 @@ fn longest(scores: &[HorizonScore], runs: usize) -> Option<&HorizonScore> {
     reached.max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s))
 }
 
-/// Whether the error `after` is lower than `before` by more than 1 %.
+/// Whether the error in `after` at the horizon of [`judged`] is lower than that in `before` by more than 1 %.
 pub fn better(after: &[HorizonScore], before: &[HorizonScore]) -> bool {
     judged(after).zip(judged(before)).is_some_and(|(a, b)| a < (1.0 - IMPROVED) * b)
 }
 
-/// Whether every coefficient of the effect `id` is confounded with a coefficient of the model before the effect was added.
+/// Whether each coefficient of the effect `id` is confounded with a coefficient of the model without the effect: the flights
+/// cannot separate the two.
 pub fn doubled(id: &str, parameters: &[Parameter]) -> bool {
     let mut own = own(id, parameters).peekable();
     own.peek().is_some() && own.all(|p| p.same_as.is_some())
 }
 
-/// Phrase that names the model's coefficients confounded with the effect `id`. Empty unless every coefficient of the effect
-/// is confounded.
+/// Phrase that names the coefficients of the model with which the effect `id` is confounded. It is empty unless each
+/// coefficient of the effect is confounded.
 fn confounded_with_model(id: &str, parameters: &[Parameter]) -> String {
     if !doubled(id, parameters) {
         return String::new();
@@ -197,7 +200,7 @@ fn own<'a>(id: &'a str, parameters: &'a [Parameter]) -> impl Iterator<Item = &'a
     parameters.iter().filter(of)
 }
 
-/// Reasons to reject the fitted coefficients of the effect `id`.
+/// Reasons, in words, to reject the effect `id` because of its fitted coefficients.
 pub fn objections(id: &str, parameters: &[Parameter]) -> Vec<String> {
     let own: Vec<&Parameter> = own(id, parameters).collect();
     let mut objections = Vec::new();
@@ -224,7 +227,7 @@ pub fn objections(id: &str, parameters: &[Parameter]) -> Vec<String> {
     objections
 }
 
-/// Advice, in words, on coefficients that end at a bound and do not belong to an added effect.
+/// Advice, in words, on coefficients of the model itself whose fitted value is at a bound.
 pub fn at_bounds(parameters: &[Parameter]) -> Vec<String> {
     let ended = parameters.iter().filter(|p| p.at_bound && !p.added);
     ended
@@ -246,14 +249,14 @@ pub fn at_bounds(parameters: &[Parameter]) -> Vec<String> {
         .collect()
 }
 
-/// A range of ± twice the bound, in the syntax of the option `--bound`.
+/// The range from −2 to +2 times the magnitude of `bound`, in the syntax of the option `--bound`.
 fn wider(bound: f64) -> String {
     let far = 2.0 * bound.abs();
     format!("-{far}..{far}")
 }
 
-/// Notes on coefficients whose sign is significantly opposite to that of their prior mean, with a change of more than the
-/// prior standard deviation.
+/// Notes on coefficients of the model itself whose fitted sign is opposite to that in the model file. The value must differ
+/// from zero by 1.96 of its standard deviations, and from the file by more than the standard deviation in the file.
 pub fn against_prior(parameters: &[Parameter]) -> Vec<String> {
     let turned = |p: &&Parameter| {
         !p.added
@@ -274,7 +277,7 @@ pub fn against_prior(parameters: &[Parameter]) -> Vec<String> {
         .collect()
 }
 
-/// The first flight whose own estimate contradicts the estimate from all flights, and this own estimate.
+/// The first flight whose estimate of the coefficient contradicts the estimate from all flights, and the flight's estimate.
 fn outlier(p: &Parameter) -> Option<(&str, f64)> {
     let far = |value: f64, sd: f64| {
         let off = (value - p.value).abs();
@@ -284,7 +287,7 @@ fn outlier(p: &Parameter) -> Option<(&str, f64)> {
     found.map(|e| (e.flight.as_str(), e.value))
 }
 
-/// Notes on coefficients whose estimate from one flight contradicts the estimate from all flights.
+/// Notes on coefficients of the model itself for which the estimate from one flight contradicts that from all flights.
 pub fn contradictions(parameters: &[Parameter]) -> Vec<String> {
     let named = parameters.iter().filter(|p| !p.added);
     named

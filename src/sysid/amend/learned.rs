@@ -1,11 +1,13 @@
-//! Fitted constants of the flights and of the common installation, as written to the model's file.
+//! Fitted constants that are written to the model's file: misalignment angles of the sensors, trim coefficients and sensor
+//! errors. The constants of a flight apply to this flight only. Those of the installation apply to all flights.
 
 use super::flight::{OFFSETS, Own, SENSORS, SKEW};
 use crate::amend::error::AmendError;
 use crate::per_flight::{PerFlight, SensorErrors};
 use greylag_model::{FlightConstants, Known};
 
-/// The mean of an angle over flights becomes a constant of the installation if it exceeds this number of standard errors.
+/// The mean of an angle or sensor error over the flights becomes a constant of the installation if it exceeds this number of
+/// standard errors.
 const CLEAR: f64 = 2.0;
 /// Source of the constants, as written to the model's file.
 const BY: &str = "greylag amend";
@@ -13,13 +15,13 @@ const BY: &str = "greylag amend";
 /// changes each time that the sensor is switched on.
 const INSTALLED: [usize; 3] = [0, 4, 5];
 
-/// A flight's constants with the standard deviations of its unknowns, in the order of [`Own::unknowns`].
+/// The estimated constants of a flight.
 pub(super) struct Learned<'a> {
     /// Name of the flight, from its log file.
     pub name: &'a str,
-    /// Estimated constants of the flight.
+    /// Values of the constants.
     pub own: &'a Own,
-    /// Standard deviations of the unknowns, in the order of [`Own::unknowns`].
+    /// Standard deviations of the constants, in the order of [`Own::unknowns`].
     pub sd: &'a [f64],
 }
 
@@ -34,8 +36,8 @@ impl Learned<'_> {
     }
 }
 
-/// Checks that the flights `names` can have the constants `asked`. The model's file identifies the constants of a flight by
-/// the flight's name.
+/// Checks that the flights `names` can have constants as requested by `asked`. The model's file identifies the constants of a
+/// flight by the flight's name.
 ///
 /// # Errors
 /// Two flights have the same name.
@@ -50,11 +52,11 @@ pub(super) fn distinct(names: &[&str], asked: &PerFlight) -> Result<(), AmendErr
     }
 }
 
-/// Constants for the model's file after a fit to `flights` with the per-flight constants `asked`. `before` holds the previous
-/// constants of the file.
+/// Constants for the model's file after a fit to `flights`. `asked` states which constants were estimated. `before` holds the
+/// previous constants of the file.
 ///
-/// Every flight gets an entry of its own. The installation gets the mean misalignment angles that differ significantly from
-/// zero.
+/// If misalignment angles or trims were estimated, every flight gets an entry of its own. The installation gets the mean
+/// angles and mean sensor errors that differ significantly from zero.
 pub(super) fn known(before: &Known, flights: &[Learned], asked: &PerFlight) -> Known {
     let anew = asked.angles() > 0;
     let mut all = without_trims(before);
@@ -78,7 +80,7 @@ pub(super) fn known(before: &Known, flights: &[Learned], asked: &PerFlight) -> K
     all
 }
 
-/// The constants `known` without trims. Trims are not valid after a change of coefficients.
+/// The constants `known` without trims, because trims are not valid after a change of the model's coefficients.
 fn without_trims(known: &Known) -> Known {
     let mut kept = known.clone();
     kept.flights.values_mut().for_each(|own| own.trims = None);
@@ -86,10 +88,11 @@ fn without_trims(known: &Known) -> Known {
     kept
 }
 
-/// The installation after a fit to `flights`, from the installation `before`: mean misalignment angles if the fit has estimated
-/// any, and mean sensor errors. `None` if nothing differs significantly from zero.
+/// The constants of the installation after a fit to `flights`: mean misalignment angles if the fit has estimated any, and mean
+/// sensor errors. Means that do not differ significantly from zero are omitted.
 ///
-/// A fit without misalignment angles has corrected its flights with the sensor errors of `before`. Its own are added to them.
+/// A fit with misalignment angles replaces the constants `before`. A fit without them has corrected its flights with `before`.
+/// Its sensor errors are therefore added to those of `before`, and the angles of `before` are kept.
 fn installation(
     before: Option<&FlightConstants>,
     flights: &[Learned],
@@ -119,7 +122,8 @@ fn installation(
     })
 }
 
-/// The constant `of` a flight (value and standard deviation) that `flights` have in common, see [`common`].
+/// The value of a constant that `flights` have in common, see [`common`]. `of` returns the value and standard deviation of the
+/// constant of one flight.
 fn over(flights: &[Learned], of: impl Fn(&Learned) -> [f64; 2]) -> f64 {
     common(&flights.iter().map(of).collect::<Vec<_>>())
 }
@@ -136,7 +140,7 @@ fn common(estimates: &[[f64; 2]]) -> f64 {
     if mean.abs() > CLEAR * error { mean } else { 0.0 }
 }
 
-/// The sensor errors that the installation `after` has in addition to those of `before`, in words; `None` if there are none.
+/// Text about the sensor errors that the installation `after` has in addition to those of `before`. `None` if there are none.
 pub(super) fn sensors_in_words(
     before: Option<&FlightConstants>,
     after: &FlightConstants,
@@ -158,7 +162,7 @@ pub(super) fn sensors_in_words(
     (!said.is_empty()).then(|| said.join(", "))
 }
 
-/// Misalignment angles of an installation in words.
+/// Text about the misalignment angles of an installation that are not zero.
 pub(super) fn in_words(installation: &FlightConstants) -> String {
     let named = ["roll", "pitch", "yaw"].into_iter().zip(installation.axes_deg.unwrap_or_default());
     let turned: Vec<String> =

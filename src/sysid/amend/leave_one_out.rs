@@ -1,4 +1,7 @@
-//! Selection of a model's structure by leave-one-out cross-validation: a fit to all other flights predicts each flight.
+//! Selection of a model's structure by leave-one-out cross-validation: each flight is predicted by a fit to all other flights.
+//!
+//! A structure states which coefficients are fitted and which effects are added. The error of a flight is the NRMSE of free
+//! runs (open-loop simulations from measured states).
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -20,21 +23,21 @@ use greylag_model::GreyBox;
 /// Smallest number of flights for leave-one-out cross-validation.
 pub const LEAST_FLIGHTS: usize = 3;
 
-/// A candidate structure.
+/// A structure to be compared.
 #[derive(Clone, Debug)]
 pub struct Structure {
-    /// Description of the structure, in the terms of the user's request.
+    /// Name of the structure, in the words of the command line.
     pub name: String,
     /// The fitted part of the structure.
     pub fitted: Fitted,
 }
 
-/// The fitted part of a structure.
+/// What is fitted in a structure.
 #[derive(Clone, Debug)]
 pub enum Fitted {
     /// No coefficient: the model as given.
     Nothing,
-    /// The model's coefficients, with added effects and constants of each flight.
+    /// The model's coefficients, together with added effects and constants of each flight.
     Coefficients {
         /// Effects that are added.
         effects: Vec<Added>,
@@ -54,28 +57,28 @@ pub struct Scored {
     pub free: usize,
     /// The flights that are long enough to be predicted.
     pub flights: Vec<String>,
-    /// Scaled free-run error of each of `flights` with the fit to all other flights; NaN if the fit failed.
+    /// Error of each of `flights` with the fit to all other flights; NaN if the fit failed.
     pub errors: Vec<f64>,
-    /// Mean of `errors`; infinite if a fit failed.
+    /// Mean of `errors`; infinite if one of them is NaN.
     pub mean: f64,
-    /// Standard error of the mean over the flights.
+    /// Standard error of `mean`, from the scatter of `errors`.
     pub standard_error: f64,
-    /// Standard error of the mean paired difference from the best structure.
+    /// Standard error of the mean difference from the best structure's errors, flight by flight. NaN for a baseline.
     pub beside_best: f64,
     /// Whether the structure is chosen: the simplest structure within one standard error of the best.
     pub chosen: bool,
 }
 
-/// Leaves out each of `flights` in turn and computes the error of each of `structures` of `model` on this flight. Forecasts
-/// without aerodynamics follow as baselines and are never chosen.
+/// Leaves out each of `flights` in turn and computes the error of each of `structures` of `model` on this flight. Baselines
+/// (forecasts without aerodynamics) follow in the result and are never chosen.
 ///
-/// The chosen structure has the fewest free coefficients among all whose mean error exceeds that of the best structure by at
-/// most one standard error of the paired difference, or by 1 % (the rule of Breiman et al., Classification and Regression
-/// Trees, 1984, section 3.4.3, with paired differences).
+/// The chosen structure has the fewest free coefficients among all whose mean error exceeds that of the best structure by no
+/// more than one standard error of the difference, flight by flight, or by 1 % (the rule of Breiman et al., Classification and
+/// Regression Trees, 1984, section 3.4.3, with paired differences).
 ///
 /// # Errors
-/// Fewer than [`LEAST_FLIGHTS`] flights are long enough for the shortest horizon, the sampling interval of a flight is not
-/// usable, an effect cannot join the model, every fit fails, or `progress` cancelled.
+/// If fewer than [`LEAST_FLIGHTS`] flights are long enough for the shortest horizon, if the sampling interval of a flight is
+/// not usable, if an effect cannot be added to the model, if every fit fails, or if `progress` cancels.
 pub fn leave_one_out(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -92,7 +95,7 @@ pub fn leave_one_out(
     };
     let right = ready(&put_right(&model.known, flights).0)?;
     let ready = ready(flights)?;
-    // all structures are compared at one horizon: the longest horizon that every predicted flight reaches
+    // all structures are compared at the longest horizon that every predicted flight reaches
     let reached = |f: &Flight| judged_at(&scores(model, std::slice::from_ref(f), horizons_s));
     let reached: Vec<Option<f64>> = ready.iter().map(reached).collect();
     let at = reached.iter().flatten().copied().fold(f64::INFINITY, f64::min);
@@ -118,7 +121,7 @@ pub fn leave_one_out(
         }
         all.push(scored(structure, free(model, &structure.fitted)?, errors));
     }
-    // without any fit, the model as given would be chosen without a comparison
+    // if no fit succeeded, the model as given would be chosen without a comparison
     if let Some(why) = failed.filter(|_| !any_fit) {
         return Err(why);
     }
@@ -130,9 +133,9 @@ pub fn leave_one_out(
 
 /// The flights of a cross-validation.
 struct Set<'a> {
-    /// All flights, uncorrected, for the prediction.
+    /// All flights as reconstructed, for the predictions.
     judged: &'a [Flight],
-    /// The same flights corrected with their constants in the model's file, for the fits.
+    /// The same flights, corrected for the sensor errors and misaligned axes that the model's file states, for the fits.
     fitted: &'a [Flight],
     /// Indices of the flights that are long enough to be predicted. The other flights are only used in fits.
     judges: &'a [usize],
@@ -168,8 +171,8 @@ fn scores(
     Judge { test, horizons_s }.scores(model)
 }
 
-/// Error of the left-out flight with the index `left`, predicted by the fit to all other flights. The inner error is the
-/// reason why this fit failed.
+/// Error of the flight with the index `left`, predicted by a fit to all other flights. The inner error states why this fit
+/// failed.
 fn error_of(
     model: &GreyBox,
     set: &Set,
@@ -190,7 +193,7 @@ fn error_of(
         }
         Fitted::Coefficients { effects, per_flight } => {
             let added = effects.iter().map(|a| a.id.clone()).collect();
-            // no further flight can judge the common sensor errors
+            // no other flight is left to judge the common sensor errors
             let sensors = match per_flight.sensors {
                 SensorErrors::Kept => SensorErrors::Kept,
                 SensorErrors::Judged | SensorErrors::Dropped => SensorErrors::Dropped,
@@ -247,7 +250,8 @@ pub(super) fn mean_with_error(x: &[f64]) -> [f64; 2] {
     [mean, (variance / n).sqrt()]
 }
 
-/// Marks the simplest structure whose mean error is within one standard error of the best, or within 1 %.
+/// Marks the structure with the fewest free coefficients whose mean error exceeds the best by no more than one standard error
+/// of the difference, or by 1 %.
 fn choose(all: &mut [Scored]) {
     let best = all.iter().min_by(|a, b| a.mean.total_cmp(&b.mean)).cloned();
     let Some(best) = best.filter(|b| b.mean.is_finite()) else { return };
@@ -322,7 +326,8 @@ mod tests {
         choose(&mut all);
         // mean errors 0.2500 and 0.2467: the mean difference of 0.003 has a standard error of 0.014
         assert_eq!(all.map(|s| s.chosen), [false, true, false, false]);
-        // significantly better in each flight, although the flights differ much more from one another
+        // significantly better in each flight, although the errors differ much more between the flights than between the
+        // structures
         let mut all = [of("tuned", 20, &[0.20, 0.30, 0.40]), of("more", 30, &[0.10, 0.21, 0.29])];
         choose(&mut all);
         assert_eq!(all.map(|s| s.chosen), [false, true]);

@@ -1,7 +1,8 @@
 //! Refits a model to flights by output error and adds effects to it.
 //!
 //! The method is described in `docs/explanation/diagnosis.md`. An equation-error fit provides starting values of the
-//! coefficients. An output-error fit by multiple shooting refines them. Held-out flights validate the result.
+//! coefficients. An output-error fit by multiple shooting (simulations of short segments) refines them. Held-out flights, which
+//! were not fitted, validate the result.
 
 mod amendment;
 mod answer;

@@ -1,5 +1,8 @@
-//! Derivatives of the residuals of a shot (a short free run), and normal equations from which the errors of the initial
-//! state are eliminated.
+//! Derivatives and normal equations of the output-error fit.
+//!
+//! A shot is a short open-loop simulation (free run) along a part of a flight. The unknowns of the fit are the free coefficients
+//! of the model, constants of each flight, and the errors of each shot's initial state. The latter are eliminated from the
+//! normal equations.
 
 use std::borrow::Cow;
 
@@ -14,72 +17,73 @@ use greylag_physics::Controls;
 
 /// Finite-difference steps of the initial state, in the units of the state (rad, m/s, rad/s).
 const STATE_STEP: [f64; 8] = [1e-5, 1e-5, 1e-3, 1e-4, 1e-4, 1e-4, 1e-5, 1e-5];
-/// Finite-difference step of the actuators' delay, s: half a sampling interval at 100 Hz.
+/// Finite-difference step of the delay of the recorded actuators, s: half a sampling interval at 100 Hz.
 const SKEW_STEP: f64 = 5e-3;
 
-/// Finite-difference step of the actuators' blur, in squared sampling intervals.
+/// Finite-difference step of the actuators' blur, in squared sampling intervals. The blur measures how far a recorded deflection
+/// is an average over time.
 const BLUR_STEP: f64 = 0.05;
 
-/// Finite-difference step of a trim, relative to its prior standard deviation.
+/// Finite-difference step of a trim (a coefficient offset of one flight), as a fraction of its prior standard deviation.
 const TRIM_STEP: f64 = 1e-3;
 
-/// Current point of the search.
+/// Present values of the unknowns.
 #[derive(Clone, Debug)]
 pub(super) struct Place {
     /// Values of the free coefficients.
     pub theta: Vec<f64>,
     /// Constants of each flight.
     pub own: Vec<Own>,
-    /// Error of each shot's initial state, in the units of the state.
+    /// Errors of each shot's initial state, in the units of the state.
     pub starts: Vec<[f64; 8]>,
 }
 
-/// Weights of a shot's residuals and of its initial state's errors.
+/// Weights in the cost of a shot.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights {
-    /// Inverse variance of each state's residual, divided by the common correlation length (samples).
+    /// For the residual of each state: its inverse variance, divided by the correlation length (samples) of the residuals.
     pub output: [f64; 8],
-    /// Inverse variance of the initial state's errors.
+    /// For the error of each initial state: its inverse prior variance.
     pub start: [f64; 8],
 }
 
-/// Acting deflections, by flight, segment and model step. They are the recorded deflections after corrections of the record
-/// and after the lags and delays of the model's input effects.
+/// Acting deflections, indexed by flight, segment and model step. They follow from the recorded deflections by correction of the
+/// record's delay and blur, and by the model's input effects, such as lags.
 pub(super) type Acting = Vec<Vec<Vec<Controls>>>;
 
-/// Perturbed models for the derivative with respect to one coefficient.
+/// The perturbed models for the derivative with respect to one coefficient.
 struct Variant {
     /// The model with the smaller value; `None` for the present model.
     low: Option<Side>,
     high: Side,
-    /// Difference of the coefficient between both models.
+    /// Value of the coefficient in the model `high` minus that in the other model.
     between: f64,
 }
 
 struct Side {
     model: GreyBox,
-    /// Acting deflections under `model`; `None` if they are equal to those under the present model.
+    /// Acting deflections with `model`; `None` if they equal those with the present model.
     acting: Option<Acting>,
 }
 
-/// The present model with the perturbed models of its derivatives.
+/// The present model, and the perturbed models and deflections for the derivatives.
 pub(super) struct Neighbourhood {
     pub model: GreyBox,
     /// Trims and misalignment angles that are estimated for each flight, in addition to its sensor errors.
     pub asked: PerFlight,
-    /// Acting deflections under the present model.
+    /// Acting deflections with the present model.
     pub acting: Acting,
     variants: Vec<Variant>,
     late: [Acting; 2],
     blurred: [Acting; 2],
 }
 
-/// Acting deflections of every flight under `model`.
+/// Acting deflections of every flight with `model`.
 pub(super) fn acting(model: &GreyBox, flights: &[Flight], place: &Place) -> Acting {
     moved(model, flights, place, SKEW, 0.0)
 }
 
-/// Acting deflections of every flight under `model`, with the sensor constant `which` increased by `by`.
+/// Acting deflections of every flight with `model`, after the sensor constant with index `which` was increased by `by`.
 fn moved(model: &GreyBox, flights: &[Flight], place: &Place, which: usize, by: f64) -> Acting {
     let one = |(f, own): (&Flight, &Own)| {
         let mut s = own.sensors;
@@ -90,7 +94,7 @@ fn moved(model: &GreyBox, flights: &[Flight], place: &Place, which: usize, by: f
 }
 
 impl Neighbourhood {
-    /// Perturbed models around `place`.
+    /// Sets the coefficients of `base` to those of `place`, and makes the perturbed models and deflections.
     pub fn new(
         base: &GreyBox,
         free: &[Free],
@@ -120,19 +124,19 @@ impl Neighbourhood {
 
 /// Normal equations of a shot for the free coefficients and the constants of the shot's flight.
 pub(super) struct Normal {
-    /// Information matrix after elimination of the initial state.
+    /// Information matrix after elimination of the initial state's errors.
     pub information: DMatrix<f64>,
-    /// Gradient after elimination of the initial state.
+    /// Gradient of the cost after elimination of the initial state's errors.
     pub gradient: DVector<f64>,
-    /// Inverse information of the initial state. `coupling` is the information that couples the initial state to the other
-    /// unknowns, `start_gradient` is the gradient with respect to the initial state.
+    /// Inverse of the information matrix of the initial state. `coupling` is the block of the full information matrix between
+    /// the other unknowns and the initial state. `start_gradient` is the gradient with respect to the initial state.
     inverse: SMatrix<f64, 8, 8>,
     coupling: DMatrix<f64>,
     start_gradient: SVector<f64, 8>,
 }
 
 impl Normal {
-    /// Change of the initial state that minimises the cost for a given change `step` of the other unknowns.
+    /// The change of the initial state that minimises the cost for a given change `step` of the other unknowns.
     pub fn start_step(&self, step: &DVector<f64>) -> [f64; 8] {
         let moved = self.coupling.transpose() * step;
         let gradient = SVector::<f64, 8>::from_fn(|i, _| self.start_gradient[i] + moved[i]);
@@ -141,7 +145,7 @@ impl Normal {
     }
 }
 
-/// Half the weighted sum of squares of a shot's residuals and of its initial state's errors.
+/// Cost of a shot: half the weighted sum of the squares of its residuals and of its initial state's errors `start`.
 pub(super) fn cost(shot: &Shot, residuals: &[[f64; 8]], start: &[f64; 8], w: &Weights) -> f64 {
     let square = |x: &[f64; 8], w: &[f64; 8]| (0..8).map(|k| w[k] * x[k] * x[k]).sum::<f64>();
     let output: f64 = residuals.iter().map(|r| square(r, &w.output)).sum();
@@ -158,7 +162,8 @@ pub(super) fn of_flight<'a>(model: &'a GreyBox, own: &Own) -> Cow<'a, GreyBox> {
     Cow::Owned(of_flight)
 }
 
-/// Residuals of the free run of a shot whose flight has the constants `own`.
+/// Residuals of a shot whose flight has the constants `own` and whose initial state has the errors `from`. `controls` are the
+/// acting deflections.
 pub(super) fn run(
     model: &GreyBox,
     controls: &Acting,
@@ -174,8 +179,8 @@ pub(super) fn run(
     shooting::residuals(flight, shot, own, &model.scale(), &path)
 }
 
-/// Derivatives of the residuals of `shot`, which has the number `index`. The columns are the free coefficients, the
-/// flight's constants and the initial state. Each sample has eight rows, one for each state.
+/// Derivatives of the residuals of `shot`, the shot with number `index`. The columns belong to the free coefficients, the
+/// flight's constants and the initial state. There are eight rows per sample, one for each state.
 pub(super) fn jacobian(
     around: &Neighbourhood,
     flights: &[Flight],
@@ -248,7 +253,8 @@ pub(super) fn normal(
     eliminate(&j, &r, from, w)
 }
 
-/// Fills the columns of the sensors' offsets: the direct effect on the residual less the effect through the initial state.
+/// Fills the columns of the sensor errors of airspeed, rates, α and β. A sensor error changes the recorded state directly. It
+/// also changes the initial state of the simulation, which is a recorded one. A column is the first change minus the second.
 fn sensor_columns(
     j: &mut DMatrix<f64>,
     [count, starts]: [usize; 2],
@@ -269,8 +275,8 @@ fn sensor_columns(
     }
 }
 
-/// Fills the columns of the misalignment angles, which begin at `first`: the direct effect on the residual less the effect
-/// through the initial state.
+/// Fills the columns of the misalignment angles, which begin at the index `first`. A misalignment changes the recorded states
+/// directly, and the simulation through the initial state. A column is the first change minus the second.
 fn askew_columns(
     j: &mut DMatrix<f64>,
     [first, starts]: [usize; 2],
@@ -291,7 +297,7 @@ fn askew_columns(
 
 fn eliminate(j: &DMatrix<f64>, r: &DVector<f64>, from: &[f64; 8], w: &Weights) -> Normal {
     let m = j.ncols() - 8;
-    // an explicit transpose is faster: matrix products are blocked, `tr_mul` is not
+    // an explicit transpose is faster, because matrix products are computed in blocks and `tr_mul` is not
     let across = j.transpose();
     let all = &across * j;
     let gradient = &across * r;
@@ -301,7 +307,7 @@ fn eliminate(j: &DMatrix<f64>, r: &DVector<f64>, from: &[f64; 8], w: &Weights) -
         own[(k, k)] += w.start[k];
         start_gradient[k] += w.start[k] * from[k];
     }
-    // the matrix is positive definite because of the prior; if rounding makes it singular, NaN ends the search
+    // the matrix is positive definite because of the prior; if rounding makes it singular, the NaN ends the fit
     let inverse = own.try_inverse().unwrap_or_else(|| SMatrix::from_element(f64::NAN));
     let coupling = all.view((0, m), (m, 8)).into_owned();
     let through = &coupling * inverse;

@@ -1,9 +1,9 @@
 //! Output-error estimation by multiple shooting: fits the coefficients such that short free runs follow the flights.
 //!
-//! Each shot starts from a reconstructed state. The error of this state is an unknown that is eliminated from the normal
-//! equations. The sensors' remaining biases and the actuators' delay are unknowns of each flight. The weights of the
-//! residuals follow from their variances and one common correlation length, which are re-estimated during the search. Priors
-//! are Gaussian, with the standard deviation [`Named::width`](greylag_model::Named::width).
+//! A shot is a free run (open-loop simulation) from a reconstructed state. The error of this state is an unknown that is
+//! eliminated from the normal equations. The sensors' remaining biases and the actuators' delay are unknowns of each flight.
+//! The weights of the residuals follow from their variances and one common correlation length, which are re-estimated during
+//! the search. Priors are Gaussian, with the standard deviation [`Named::width`](greylag_model::Named::width).
 
 mod estimates;
 mod gauss_newton;
@@ -28,7 +28,7 @@ use greylag_num::statistics::quantile;
 
 /// Smallest usable duration of all flights together, s.
 pub const LEAST_S: f64 = 10.0;
-/// Steps with the same derivatives end if no coefficient changes by more than this number of standard deviations.
+/// The steps with the same derivatives end when no coefficient changes by more than this number of standard deviations.
 const STEP_TOLERANCE: f64 = 0.03;
 /// Derivatives are recomputed until a step with new derivatives changes no coefficient by more than this number of standard
 /// deviations.
@@ -105,8 +105,8 @@ pub(super) struct Left {
 ///
 /// # Errors
 /// The flights are shorter than `LEAST_S` in total, two flights with constants of their own have the same name, no
-/// coefficient is free, the flights excite none, free runs diverge too early, the search does not converge or its equations
-/// are singular, or `progress` cancelled.
+/// coefficient is free, the flights excite no free coefficient, free runs diverge too early, the search does not converge or
+/// its equations are singular, or `progress` cancelled.
 pub fn fit(
     model: &GreyBox,
     flights: &[Flight],
@@ -271,7 +271,7 @@ impl<'a> Search<'a> {
         self.short = 0;
         for (shot, reach) in self.shots.iter_mut().zip(&reach) {
             if *reach < shot.steps {
-                // the first three quarters of the run before divergence still contain information
+                // only the first three quarters of the run before divergence are used
                 shot.steps = reach * 3 / 4;
                 self.short += 1;
             }

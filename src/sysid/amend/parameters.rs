@@ -1,4 +1,7 @@
-//! The free coefficients of a fit, with their priors, bounds and steps.
+//! The free coefficients of a fit, with their priors, bounds and finite-difference steps.
+//!
+//! Shape constants are coefficients in which the model is nonlinear. A curve is an effect that is given by ordinates instead of
+//! a formula.
 
 use greylag_model::{GreyBox, Named};
 use greylag_physics::catalogue;
@@ -6,21 +9,20 @@ use greylag_physics::effects::Description;
 use greylag_physics::formula::register;
 use greylag_physics::inputs;
 
-/// Coefficients of added effects that are held at their starting values: fractions that cannot be identified together with
-/// the shape that they scale.
+/// Coefficients of added effects that are held at their starting values: factors of a shape that the data cannot separate from
+/// the shape itself.
 const HELD: &[&str] = &["lift_stall.k"];
-/// Effects that are curves without a formula. Their ordinates have a narrow prior about their starting values. This prior
-/// determines the curve in ranges with few data.
+/// Curves. Their ordinates have a narrow prior about their starting values, which determines the curve in ranges with few data.
 pub(super) const SLIGHT: &[&str] = &["lift_curve", "drag_curve"];
 /// Prior standard deviation of an ordinate of a curve, as a fraction of the range of its bounds.
 const SLIGHT_SHARE: f64 = 0.1;
-/// Pairs of a curve and an effect whose formula describes the same curve. The shape constants of the formula are held,
+/// Pairs of a curve and the effect whose formula describes the same curve. The shape constants of that formula are held,
 /// because the curve can represent any change of them.
 const TAKES_OVER: &[(&str, &str)] = &[("lift_curve", "lift_stall")];
-/// Finite-difference step of a coefficient in which the model is linear, as a fraction of its prior standard deviation.
+/// Finite-difference step of a coefficient of the given model in which the model is linear, as a fraction of its prior standard
+/// deviation.
 const STEP: f64 = 1e-3;
-/// Finite-difference step of a shape constant, as a fraction of its value. Shape constants are coefficients in which the
-/// model is nonlinear.
+/// Finite-difference step of a shape constant, as a fraction of its value.
 const SHAPE_STEP: f64 = 0.02;
 /// Largest change of a shape constant in one iteration, as a fraction of its value.
 const SHAPE_STRIDE: f64 = 0.4;
@@ -37,7 +39,7 @@ pub(super) struct Free {
     /// Prior mean. `width` is the prior standard deviation.
     pub prior: f64,
     pub width: f64,
-    /// Physically possible range.
+    /// Range in which the fit keeps the coefficient.
     pub bounds: (f64, f64),
     /// Finite-difference step of the derivatives with respect to the coefficient.
     pub step: f64,
@@ -54,7 +56,7 @@ pub(super) struct Free {
     pub added: bool,
 }
 
-/// Description of the effect `id`, and whether it is an input effect.
+/// Description of the effect `id`, and whether it is an input effect. `None` if there is no such effect.
 pub(super) fn describe(id: &str) -> Option<(Description, bool)> {
     catalogue::describe(id).map(|about| (about, inputs::Kind::from_id(id).is_some()))
 }
@@ -64,11 +66,11 @@ fn remembers(id: &str) -> bool {
     register::find(id).is_some_and(|effect| !effect.memories().is_empty())
 }
 
-/// The free coefficients of `model`; `added` are the identifiers of added effects.
+/// The free coefficients of `model`. `added` are the ids of the effects that were added to the given model.
 ///
 /// A coefficient of the given model is held if its prior standard deviation is zero. The prior standard deviation of a
-/// coefficient of an added effect is the range of its bounds, or a fraction of this range for a curve. The shape constants
-/// of a formula are held if a curve replaces the formula.
+/// coefficient of an added effect is the range of its bounds, or a fraction of this range for a curve. The shape constants of a
+/// formula are held if the model also has the curve that replaces the formula.
 pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
     let linear = model.linear();
     let named = model.coefficients().iter().zip(linear).enumerate();
@@ -129,7 +131,8 @@ pub(super) fn from_scratch(model: &GreyBox) -> GreyBox {
     model.clone().with_widths(range)
 }
 
-/// Names of the coefficients of `model` that no fit changes: they are zero, and their file states no standard deviation.
+/// Names of the coefficients of `model` that no fit changes, because they are zero and the model file states no standard
+/// deviation.
 pub(super) fn held_at_zero(model: &GreyBox) -> Vec<String> {
     let held = model.coefficients().iter().filter(|c| c.width() == 0.0 && c.sd.is_none());
     let known =
@@ -137,13 +140,13 @@ pub(super) fn held_at_zero(model: &GreyBox) -> Vec<String> {
     known.map(|c| c.name.clone()).collect()
 }
 
-/// Effects of `model` whose shape constants are held, each with the curve that replaces its formula.
+/// Effects of `model` whose shape constants are held, each with the curve that describes the same.
 pub(super) fn taken_over(model: &GreyBox) -> impl Iterator<Item = (&'static str, &'static str)> {
     let both = TAKES_OVER.iter().filter(|(by, of)| model.has(by) && model.has(of));
     both.map(|(by, of)| (*of, *by))
 }
 
-/// `model` with the free coefficients at `values`.
+/// A copy of `model` with the free coefficients at `values`.
 pub(super) fn with(model: &GreyBox, free: &[Free], values: &[f64]) -> GreyBox {
     let mut all: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
     for (f, value) in free.iter().zip(values) {
@@ -154,11 +157,11 @@ pub(super) fn with(model: &GreyBox, free: &[Free], values: &[f64]) -> GreyBox {
     changed
 }
 
-/// Models for a finite difference with respect to the free coefficient number `place` at `values`, and the difference of
-/// the coefficient between them.
+/// Models for a finite difference with respect to the free coefficient with the index `place` at `values`, and the difference
+/// of this coefficient between the two models.
 ///
-/// Differences are one-sided for coefficients in which the model is linear; the first model is then `None`. They are central
-/// for all other coefficients.
+/// The difference is one-sided if the model is linear in the coefficient. The first model is then `None`, which stands for the
+/// model at `values`. Otherwise the difference is central.
 pub(super) fn beside(
     model: &GreyBox,
     free: &[Free],

@@ -1,4 +1,5 @@
-//! Fast estimates: a fit without added effects, and equation-error estimates with added effects.
+//! Parts of the complete refit: an output-error fit without added effects, and a fast equation-error estimate with added
+//! effects.
 
 use rayon::prelude::*;
 
@@ -14,19 +15,20 @@ use crate::flight_path::reconstruction::Reconstruction;
 use crate::progress::Progress;
 use greylag_model::GreyBox;
 
-/// A model estimated by equation error only: from forces and moments, without free runs.
+/// A model estimated by equation error only, that is from forces and moments, without simulations.
 #[derive(Clone, Debug)]
 pub struct Estimate {
-    /// The estimated model.
+    /// The model with the estimated coefficients.
     pub model: GreyBox,
-    /// Free-run errors of the model on the held-out flights, at the default horizons of [`Options`].
+    /// Errors of the model in free runs (open-loop simulations) of the held-out flights, at the default horizons of [`Options`].
     pub after: Vec<HorizonScore>,
 }
 
-/// Fits the coefficients of `model` to `flights` without added effects. The result is suitable for [`Options::tuned`].
+/// Fits the coefficients of `model` to `flights` by output error, without added effects. The result can be passed on in
+/// [`Options::tuned`].
 ///
 /// # Errors
-/// The flights do not allow a fit (see `AmendError`), or `progress` cancelled.
+/// If the flights do not allow a fit (see `AmendError`), or `progress` cancelled.
 pub fn tune(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -35,10 +37,11 @@ pub fn tune(
     output_error::fit(model, &ready(model, flights)?, &FitOptions::default(), progress)
 }
 
-/// Estimates `model` with `effects` by equation error over `flights`, and computes its free-run errors on `held_out`.
+/// Adds `effects` to `model`, estimates its coefficients by equation error over `flights`, and computes its errors in free runs
+/// of `held_out`.
 ///
 /// # Errors
-/// An effect cannot join the model, or the sampling interval of a flight is not usable.
+/// If an effect cannot be added to the model, or the sampling interval of a flight is not usable.
 pub fn estimate(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -59,7 +62,7 @@ pub fn estimate(
     Ok(Estimate { model, after })
 }
 
-/// The flights prepared for a fit.
+/// Prepares the flights for a fit.
 fn ready(model: &GreyBox, flights: &[Reconstruction]) -> Result<Vec<Flight>, AmendError> {
     let slowest = model.airframe.envelope.flying_from_mps();
     Ok(flights.par_iter().map(|f| Flight::new(f, slowest)).collect::<Result<_, _>>()?)

@@ -1,4 +1,7 @@
-//! The result of an amendment, serialized to JSON (`greylag.amend/1`).
+//! The result of an amendment, serialised to JSON (`greylag.amend/1`).
+//!
+//! An amendment re-estimates ("tunes") a model's coefficients from flights and adds effects. Its errors are those of free runs
+//! (open-loop simulations) along held-out flights, which are not fitted. The horizon of a free run is its duration.
 
 use serde::Serialize;
 
@@ -8,7 +11,7 @@ use super::judge::{CLEAR, judged, judged_at, repeated_at};
 use crate::compare::{Answer, HorizonScore};
 use crate::per_flight::{Constant, PerFlight};
 
-/// Relative rise of the held-out error above which the fit is worse than the model as given.
+/// The fit counts as worse than the model as given if its held-out error is larger by more than this fraction.
 const WORSE: f64 = 0.01;
 
 /// A fitted coefficient with its prior and its uncertainty.
@@ -16,13 +19,14 @@ const WORSE: f64 = 0.01;
 pub struct Parameter {
     /// Name, `effect.coefficient`, as in the model file.
     pub name: String,
-    /// Meaning, with its unit.
+    /// Meaning of the coefficient, with its unit.
     pub meaning: &'static str,
     /// Whether the coefficient belongs to an added effect.
     pub added: bool,
-    /// Value before the fit.
+    /// Value before the fit: the prior mean.
     pub prior: f64,
-    /// Prior standard deviation; for an added effect, the width of its bounds.
+    /// Prior standard deviation. For an added effect it is the range between the coefficient's bounds, or a fraction of this
+    /// range for a curve.
     pub prior_sd: f64,
     /// Estimate, in the coefficient's unit.
     pub value: f64,
@@ -32,10 +36,10 @@ pub struct Parameter {
     pub ci95: [f64; 2],
     /// Whether the estimate is at a bound of the physically possible range.
     pub at_bound: bool,
-    /// Estimates from each flight alone, to first order.
+    /// Estimate from each flight alone, by one Gauss–Newton step from the common estimate.
     pub by_flight: Vec<FlightEstimate>,
-    /// Coefficient of the model with which this coefficient of an added effect is confounded (error correlation above
-    /// 0.9); `None` if there is none.
+    /// For a coefficient of an added effect: the model's own coefficient with which it is confounded (error correlation above
+    /// 0.9). `None` if there is none.
     pub same_as: Option<String>,
 }
 
@@ -46,7 +50,7 @@ pub struct FlightEstimate {
     pub flight: String,
     /// Estimate from this flight and the prior.
     pub value: f64,
-    /// Standard deviation of `value`, with the information of the prior.
+    /// Standard deviation of `value`, which includes the information of the prior.
     pub sd: f64,
 }
 
@@ -55,34 +59,34 @@ pub struct FlightEstimate {
 pub struct FittedFlight {
     /// Name of the flight.
     pub flight: String,
-    /// Duration of the data used, s.
+    /// Duration of the data that were used, s.
     pub seconds: f64,
     /// Delay of the recorded actuators, s, and its standard deviation.
     pub actuators_late_s: [f64; 2],
-    /// Remaining relative scale error of the airspeed, and its standard deviation.
+    /// Relative scale error of the airspeed that remains after flight-path reconstruction, and its standard deviation.
     pub airspeed_scale: [f64; 2],
-    /// Remaining bias of the angle-of-attack vane, rad, and its standard deviation.
+    /// Bias of the angle of attack that remains after flight-path reconstruction, rad, and its standard deviation.
     pub alpha_bias_rad: [f64; 2],
-    /// Remaining bias of the sideslip vane, rad, and its standard deviation.
+    /// Bias of the sideslip angle that remains after flight-path reconstruction, rad, and its standard deviation.
     pub beta_bias_rad: [f64; 2],
     /// Trims and misalignment angles of the flight; empty unless they were estimated.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub own: Vec<OwnConstant>,
 }
 
-/// A trim of one flight, or a misalignment angle of its measured axes.
+/// A trim of one flight (an offset of a coefficient in this flight), or a misalignment angle of its measured axes.
 #[derive(Clone, Debug, Serialize)]
 pub struct OwnConstant {
-    /// `askew_roll`, `askew_pitch`, `askew_yaw` (rad), or one of the trims `CD0`, `CL0`, `CY0`, `Cl0`, `Cm0`, `Cn0`,
-    /// `thrust_share` (dimensionless). The trims are added to the model's coefficients in this flight.
+    /// Name: one of the misalignment angles `askew_roll`, `askew_pitch`, `askew_yaw` (rad), or one of the trims `CD0`, `CL0`,
+    /// `CY0`, `Cl0`, `Cm0`, `Cn0`, `thrust_share` (dimensionless).
     pub name: &'static str,
-    /// Prior standard deviation, about zero.
+    /// Prior standard deviation. The prior mean is zero.
     pub prior_sd: f64,
     /// Estimate, in the unit of `name`.
     pub value: f64,
     /// Standard deviation of `value`, including the uncertainty of the model's own coefficient.
     pub sd: f64,
-    /// Estimate less the mean of all flights, and its standard deviation; `None` for a single flight.
+    /// `value` minus the mean over all flights, and the standard deviation of this difference; `None` for a single flight.
     pub beside_mean: Option<[f64; 2]>,
 }
 
@@ -111,7 +115,7 @@ impl FittedFlight {
     }
 }
 
-/// The outcome for a requested effect.
+/// What became of a requested effect.
 #[derive(Clone, Debug, Serialize)]
 pub struct AddedEffect {
     /// Identifier of the effect.
@@ -120,7 +124,7 @@ pub struct AddedEffect {
     pub description: &'static str,
     /// Whether the effect was added to the amended model.
     pub joined: bool,
-    /// Reasons to reject the effect, from its estimates and the held-out flights; empty if there are none.
+    /// Objections to the effect in words, from its fit and from the held-out flights; empty if there are none.
     pub refused: Vec<String>,
     /// Manoeuvre whose data would decide whether the aircraft has this effect; empty if none is known.
     pub fly_next: String,
@@ -129,13 +133,13 @@ pub struct AddedEffect {
 /// Settings of an amendment.
 #[derive(Clone, Debug, Serialize)]
 pub struct Settings {
-    /// Lengths of shots, s.
+    /// Lengths of the short free runs (shots) that are fitted, s.
     pub lengths_s: Vec<f64>,
-    /// Horizons of the free runs, s.
+    /// Horizons of the free runs along held-out flights, s.
     pub horizons_s: Vec<f64>,
     /// Longest horizon at which models are compared, s.
     pub judged_at_s: f64,
-    /// Constants estimated for each flight.
+    /// Constants that were estimated for each flight, in addition to its sensor errors.
     #[serde(flatten)]
     pub per_flight: PerFlight,
 }
@@ -149,17 +153,17 @@ pub struct Amendment {
     pub version: &'static str,
     /// Name of the model as given.
     pub model: String,
-    /// Answer in sentences, with the numbers of these sentences.
+    /// The answer: by how much the amendment reduces the error, in a few sentences and as numbers.
     pub answer: Answer,
     /// Sentences on conventions, on refused effects and on an unmodelled rudder.
     pub sentences: Vec<String>,
-    /// Outcome for each requested effect.
+    /// What became of each requested effect.
     pub effects: Vec<AddedEffect>,
-    /// Conventions that were tried.
+    /// Alternatives to the model's integrator, force axes and air density (conventions) that were tried.
     pub conventions: Vec<Tried>,
-    /// All free coefficients of the final model, those of effects included.
+    /// All fitted coefficients of the amended model, including those of added effects.
     pub parameters: Vec<Parameter>,
-    /// Coefficients of the model tuned without effects.
+    /// All fitted coefficients of the tuned model without added effects.
     pub tuned: Vec<Parameter>,
     /// Estimated constants of each flight.
     pub flights: Vec<FittedFlight>,
@@ -171,10 +175,10 @@ pub struct Amendment {
     pub before: Vec<HorizonScore>,
     /// Held-out free-run errors of the amended model.
     pub after: Vec<HorizonScore>,
-    /// Mean of ln(scaled error of the model as given / scaled error of the fit) over the held-out free runs, and its
-    /// standard error. The errors are taken at the longest horizon up to `judged_at_s` that at least two runs reach; `None`
-    /// if there is no such horizon. A fit without a prior is compared at the longest horizon that any run reaches; `None`
-    /// if only one run reaches it.
+    /// Mean over the held-out free runs of ln(scaled error of the model as given / scaled error of the fit), and the standard
+    /// error of this mean. The horizon is the longest one up to `judged_at_s` that at least two runs reach; `None` if there is no
+    /// such horizon. For a fit without a prior it is the longest one up to `judged_at_s` that any run reaches; `None` if only one
+    /// run reaches it.
     pub decrease: Option<[f64; 2]>,
     /// Further notes for the user, in sentences.
     pub notes: Vec<String>,
@@ -183,16 +187,16 @@ pub struct Amendment {
 }
 
 impl Amendment {
-    /// Sentence that the given model is kept because the fit predicts the validation flights worse; `None` if the fit does
-    /// not.
+    /// Sentence that the model as given is kept because the fit predicts the held-out flights worse by more than 1 %; `None` if
+    /// it does not.
     pub fn worse(&self) -> Option<String> {
         let (given, after) = (judged(&self.given)?, judged(&self.after)?);
         (after > (1.0 + WORSE) * given || after.is_nan())
             .then(|| self.kept("the fit predicts the flights for validation worse"))
     }
 
-    /// Sentence that the given model is kept because only its coefficients were tuned and the 95 % interval of `decrease`
-    /// does not lie above zero; `None` otherwise.
+    /// Sentence that the model as given is kept because the fit may be better by chance; `None` if there is no such reason. The
+    /// reason applies if only coefficients were tuned and the 95 % interval of `decrease` does not lie entirely above zero.
     pub fn by_chance(&self) -> Option<String> {
         let [mean, error] = self.decrease?;
         // adding zero turns −0 into 0
@@ -208,8 +212,8 @@ impl Amendment {
         })
     }
 
-    /// Sentence that the given model is kept because only its coefficients were tuned and `decrease` is unknown: an improvement
-    /// by chance cannot be excluded. `None` otherwise.
+    /// Sentence that the model as given is kept because it is unknown whether the fit is better by chance; `None` if there is no
+    /// such reason. The reason applies if only coefficients were tuned and `decrease` is `None`.
     pub fn unjudged(&self) -> Option<String> {
         (self.decrease.is_none() && self.only_tuned()).then(|| {
             self.kept(
@@ -219,7 +223,7 @@ impl Amendment {
         })
     }
 
-    /// Sentence that the given model is kept, with the reason `why`, and with the held-out errors if there are any.
+    /// Sentence that the model as given is kept, with the reason `why`, and with the held-out errors if they are known.
     fn kept(&self, why: &str) -> String {
         let errors = judged(&self.given).zip(judged(&self.after)).zip(judged_at(&self.given));
         let errors = errors.map_or(String::new(), |((given, after), seconds)| {
@@ -237,7 +241,7 @@ impl Amendment {
             && self.settings.per_flight == PerFlight::default()
     }
 
-    /// Whether effects were requested and none of them joined.
+    /// Whether effects were requested and none of them was added.
     pub fn all_refused(&self) -> bool {
         !self.effects.is_empty() && !self.effects.iter().any(|e| e.joined)
     }
@@ -248,7 +252,7 @@ mod tests {
     use super::*;
     use crate::amend::judge::JUDGED_AT_S;
 
-    /// Scores of `runs`, each with its horizon (s) and the number of runs.
+    /// One score for each entry of `runs`, a horizon (s) and the number of runs that reach it. All have the same `error`.
     fn scores(runs: &[(f64, usize)], error: f64) -> Vec<HorizonScore> {
         let score = |&(horizon_s, runs): &(f64, usize)| HorizonScore {
             horizon_s,
@@ -290,7 +294,7 @@ mod tests {
 
     #[test]
     fn an_improvement_that_too_few_runs_can_judge_keeps_the_model_as_given() {
-        // one run reaches 5 s, two reach 2 s
+        // one run reaches 5 s, and two runs reach 2 s
         let runs = [(1.0, 3), (2.0, 2), (5.0, 1), (10.0, 0)];
         let chance = tuned(&runs, Some([0.1, 0.1]));
         assert_eq!((judged_at(&chance.given), repeated_at(&chance.given)), (Some(5.0), Some(2.0)));

@@ -1,4 +1,4 @@
-//! Shots: short free runs that start at reconstructed states and use recorded deflections.
+//! Shots: short free runs (open-loop simulations) that start at reconstructed states and use the recorded deflections.
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,7 +10,8 @@ use greylag_logs::Sampling;
 use greylag_model::{GreyBox, Memory};
 use greylag_physics::{Controls, State};
 
-/// A run has diverged once its scaled error (root mean square over the states of error / x_c) exceeds this bound.
+/// A run has diverged once its scaled error exceeds this bound. The scaled error is the root mean square over the states of
+/// error / x_c, with the reference scales x_c of the states.
 const LEFT: f64 = 0.7;
 /// Shortest shot that is fitted, s.
 pub(super) const SHORTEST_S: f64 = 0.4;
@@ -51,7 +52,7 @@ pub(super) fn cut(flights: &[Flight], length_s: f64) -> Vec<Shot> {
 }
 
 /// Deflections that act during each model step of each segment of a flight under `model`. The recorded deflections are
-/// corrected for the delay and blur in `sensors`.
+/// corrected for the delay and the blur (averaging by the recorder) in `sensors`.
 pub(super) fn acting(
     model: &GreyBox,
     flight: &Prepared,

@@ -1,11 +1,12 @@
-//! An amendment in sentences.
+//! Sentences for the user on an amendment of a model. An amendment fits the coefficients and adds effects (groups of model
+//! terms). It may change conventions: integrator, force axes or air density.
 
 use super::conventions::Tried;
 use super::judge::judged;
 use super::result::Amendment;
 use crate::per_flight::PerFlight;
 
-/// Sentences on conventions and refused effects, in addition to the amendment's answer.
+/// Sentences on conventions and on refused effects. They follow the main result, which is a sentence of its own.
 pub fn sentences(story: &Amendment) -> Vec<String> {
     let mut all = Vec::new();
     let (before, after) = (judged(&story.before), judged(&story.after));
@@ -14,7 +15,7 @@ pub fn sentences(story: &Amendment) -> Vec<String> {
     let taken = story.conventions.iter().filter(|t| t.kept);
     let taken: Vec<String> =
         taken.map(|t| format!("{} {}", t.convention.key().join("."), t.to)).collect();
-    // the answer already covers tuning and effects: a sentence is needed only if a convention changed
+    // the main result already covers coefficients and effects: a sentence is needed only if a convention changed
     if let (Some(before), Some(after), false) = (before, after, taken.is_empty()) {
         let joined = kept.iter().map(|id| (*id).to_owned());
         all.push(format!(
@@ -50,7 +51,8 @@ pub fn sentences(story: &Amendment) -> Vec<String> {
     all
 }
 
-/// Sentence on how the constants `asked` of each flight are used after the fit; `None` if no constants are asked for.
+/// A sentence on how the estimated constants of each flight are used after the fit. `asked` states which constants were
+/// estimated. `None` if there are none.
 pub fn apart(asked: &PerFlight) -> Option<String> {
     let what = match (asked.has_trims(), asked.angles() > 0) {
         (false, false) => return None,

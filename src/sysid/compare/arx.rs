@@ -1,9 +1,10 @@
-//! Forecast by a linear model with the deflections as inputs (ARX) of any order, and the choice of its order.
+//! Forecast by a linear autoregressive model with the deflections as inputs (ARX), and the choice of its order. The forecast is a
+//! baseline with which the free runs (open-loop simulations) of aircraft models are compared.
 //!
 //! With the states x and the deflections u of sample k and of the samples before it, the model is
 //! ẋ(k) = Σ A(i) x(k − i) + B(i) u(k − i) + c over i = 0 to order − 1, and x(k + 1) = x(k) + ẋ(k) Δt (Ljung, System
-//! Identification, 1999, section 4.2). A, B and c follow from least squares of one step. Departs from the reference: the states
-//! are those of the reconstruction, which has removed most of their noise.
+//! Identification, 1999, section 4.2). A, B and c minimise the sum of the squared one-step errors. Unlike in the reference, the
+//! states are not measurements but come from flight-path reconstruction, which removes most of their noise.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -19,29 +20,29 @@ use greylag_num::statistics::mean;
 
 /// Number of regressors of one sample: eight states, aileron, elevator, throttle and rudder.
 const OF_SAMPLE: usize = 12;
-/// Singular values of the normalised normal equations that do not exceed this bound are treated as zero, for example those of a
+/// Singular values of the normalised normal equations up to this bound are treated as zero. Such values belong, for example, to a
 /// rudder that never moves.
 const RANK: f64 = 1e-9;
 /// Orders that are tried, in samples.
 pub const ORDERS: [usize; 6] = [1, 2, 3, 4, 6, 8];
 /// Ridges that are tried with each order, dimensionless.
 pub const RIDGES: [f64; 4] = [0.0, 1e-6, 1e-4, 1e-2];
-/// Smallest relative decrease of the error for which a higher order replaces a lower one.
+/// A higher order replaces a lower one if it decreases the error by more than this fraction.
 const CLEARLY: f64 = 0.01;
-/// Scaled errors below this value, dimensionless, count as equal: they may differ by rounding only.
+/// Smaller scaled errors are replaced by this value (dimensionless), because they may differ by rounding only.
 const LEAST_ERROR: f64 = 1e-6;
 
-/// Order and ridge of an ARX model.
+/// Order and ridge (regularisation) of an ARX model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choice {
     /// Number of samples from which a rate is computed: the present one and those before it; at least 1.
     pub order: usize,
-    /// Number that is added to the diagonal of the normal equations after their scaling to a unit diagonal, dimensionless. It
-    /// shrinks all coefficients towards zero, with which the state is held.
+    /// Number that is added to the diagonal of the normal equations after they were scaled to a unit diagonal, dimensionless. It
+    /// shrinks all coefficients towards zero. With zero coefficients the state would not change.
     pub ridge: f64,
 }
 
-/// Reason why an ARX model cannot be fitted, chosen or judged.
+/// Reason why an ARX model cannot be fitted or compared, or its order cannot be chosen.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ArxError {
     /// The order is zero.
@@ -55,9 +56,9 @@ pub enum ArxError {
     TooLittle {
         /// Order of the model, in samples.
         order: usize,
-        /// Number of steps between samples that have all samples before them.
+        /// Number of steps from one sample to the next for which all earlier samples exist that the order requires.
         rows: usize,
-        /// Number of unknowns of each state, and smallest number of steps.
+        /// Number of unknowns of each state. At least as many steps are needed.
         needed: usize,
     },
     /// The equations have no finite solution.
@@ -69,12 +70,12 @@ pub enum ArxError {
         /// Order of the model, in samples.
         order: usize,
     },
-    /// The samples of two flights are not equally far apart, so that the samples before one mean different times.
+    /// The sample times of two flights differ. Earlier samples would then lie at different times in the past.
     #[error(
         "cannot use one linear forecast (ARX) for flights of {one} and {other} model steps a sample; resample the flights alike"
     )]
     Steps {
-        /// Number of model steps between samples of one flight, or of the flights of the fit.
+        /// Number of model steps between samples of one flight, or of the flights to which the model was fitted.
         one: usize,
         /// Number of model steps between samples of the other flight.
         other: usize,
@@ -88,7 +89,8 @@ pub enum ArxError {
         /// Number of flights.
         flights: usize,
     },
-    /// No flight reaches a horizon, or the others are too short for a fit.
+    /// No flight is as long as the shortest horizon (duration of a forecast), or the flights other than one are too short for a
+    /// fit.
     #[error(
         "cannot choose the order of a linear forecast (ARX): none of {flights} flights is longer than {shortest_s} s, or those \
          beside it are too short for a fit; give longer flights"
@@ -112,11 +114,11 @@ pub struct Arx {
 }
 
 impl Arx {
-    /// Fits a model to all samples of `flights` that have enough samples before them in their segment.
+    /// Fits a model to all samples of `flights` that have enough samples before them in their segment (a part without gaps).
     ///
     /// # Errors
-    /// The order is 0, the flights differ in the time between samples, there are fewer steps than unknowns, or a coefficient is
-    /// not finite.
+    /// If the order is 0, the flights have different sample times, there are fewer steps than unknowns, or a coefficient is not
+    /// finite.
     pub fn fit(flights: &[Prepared], choice: Choice) -> Result<Arx, ArxError> {
         if choice.order == 0 {
             return Err(ArxError::NoOrder);
@@ -155,24 +157,24 @@ impl Arx {
         Ok(arx)
     }
 
-    /// The model of order 1 without a ridge, however few samples `flights` have. `None` if a coefficient is not finite.
+    /// The model of order 1 without a ridge. The number of samples is not checked. `None` if a coefficient is not finite.
     pub(super) fn first_order(flights: &[Prepared]) -> Option<Arx> {
         let slopes = Sums::of(flights.iter(), 1).slopes(0.0)?;
         Some(Arx { order: 1, substeps: flights.first().map_or(1, |f| f.substeps), slopes })
     }
 
-    /// Number of samples from which a rate is computed.
+    /// The order: the number of samples from which a rate is computed.
     pub fn order(&self) -> usize {
         self.order
     }
 
-    /// Free-run errors on `flights`, one for each of `horizons_s` (s), with the same starts as the free runs of the models. The
-    /// errors of the states are divided by `scale`, in the units of the state.
+    /// Errors of the forecast on `flights`, one for each of `horizons_s` (s). The forecasts start at the same samples as the free
+    /// runs of aircraft models. The errors of the states are divided by `scale`, which has the units of the state.
     ///
-    /// A run that starts at a segment's first samples lacks samples before them. The first sample then stands for these.
+    /// A forecast from the first samples of a segment needs samples before the segment. Its first sample stands for them.
     ///
     /// # Errors
-    /// The time between samples of a flight is not that of the fit.
+    /// If the sample time of a flight is not that of the fit.
     pub fn scores(
         &self,
         flights: &[Prepared],
@@ -183,8 +185,8 @@ impl Arx {
         Ok(forecast::scores(&Forecast::Linear(self.clone()), flights, scale, horizons_s))
     }
 
-    /// The state `dt` (s) after `past[0]`. `past` has the present state and those before it, the newest first; `flown` has the
-    /// samples of the segment up to the present one.
+    /// The state at `dt` (s) after the present state. `past` holds the present state and those before it, the newest first.
+    /// `flown` holds the samples of the segment up to the present one.
     pub(super) fn next(&self, past: &[[f64; 8]], flown: &[Instant], dt: f64) -> [f64; 8] {
         let rate = self.rates(past, flown);
         std::array::from_fn(|k| past[0][k] + dt * rate[k])
@@ -204,15 +206,15 @@ fn same_steps(substeps: usize, flights: &[Prepared]) -> Result<(), ArxError> {
     }
 }
 
-/// Chooses order and ridge by leaving out each of `flights` in turn: a fit to the others predicts it.
+/// Chooses order and ridge by cross-validation: each of `flights` is predicted by a fit to the others.
 ///
-/// The error of a choice is the geometric mean over `horizons_s` (s) of the free-run error, averaged over the flights left out
-/// that reach the horizon. The errors of the states are divided by `scale`, in the units of the state. Of the ridges in
-/// [`RIDGES`] each order takes the best. Of the orders in [`ORDERS`] a higher one is taken only if it lowers the error by more
-/// than 1 %.
+/// For each of `horizons_s` (s) the forecast error is averaged over the flights that reach the horizon. The error of a choice is
+/// the geometric mean of these averages. The errors of the states are divided by `scale`, which has the units of the state. For
+/// each order in [`ORDERS`] the ridge in [`RIDGES`] with the smallest error is taken. A higher order replaces a lower one only if
+/// it lowers the error by more than 1 %.
 ///
 /// # Errors
-/// There are fewer than two flights, they differ in the time between samples, or they are too short.
+/// If there are fewer than two flights, their sample times differ, or they are too short.
 pub fn choose(
     flights: &[Prepared],
     scale: [f64; 8],
@@ -243,8 +245,8 @@ pub fn choose(
     best.map(|(choice, _)| choice).ok_or(too_short)
 }
 
-/// Error of `choice` in the sense of [`choose`]; `others` has the sums of all flights but one, in the order of `flights`. `None`
-/// if a fit fails or no flight reaches a horizon.
+/// The error of `choice` as defined in [`choose`]. `others` holds for each of `flights` the sums over the other flights. `None`
+/// if a fit fails or no flight reaches any horizon.
 fn error_left_out(
     flights: &[Prepared],
     others: &[Sums],
@@ -277,13 +279,13 @@ fn steps(model: &GreyBox, flight: &Prepared, segment: &[Instant]) -> Vec<[f64; 8
     segment.windows(2).map(one).collect()
 }
 
-/// Number of unknowns of each state: the coefficients of the samples, and a constant.
+/// Number of unknowns of each state: one coefficient for each regressor, and a constant.
 fn unknowns(order: usize) -> usize {
     OF_SAMPLE * order + 1
 }
 
-/// Recorded states of `segment` at sample `at` and before it, the newest first, `order` in number. Before the first sample of
-/// the segment, the first state is repeated. Roll is continuous over ±180°.
+/// The recorded states of `segment` at the sample `at` and before it, `order` in number, the newest first. The first state of the
+/// segment stands for states before it. The roll angles are continuous across ±180°.
 pub(super) fn past(segment: &[Instant], at: usize, order: usize) -> Vec<[f64; 8]> {
     let newest = segment[at].state.to_array();
     let one = |back: usize| {
@@ -294,8 +296,8 @@ pub(super) fn past(segment: &[Instant], at: usize, order: usize) -> Vec<[f64; 8]
     (0..order).map(one).collect()
 }
 
-/// States and deflections of the present sample and of those before it, the newest first, and 1 for the constant. `flown` has
-/// the samples of the segment up to the present one.
+/// The regressors: the states `past` and the deflections of the present sample and of those before it, the newest first, and 1
+/// for the constant. `flown` holds the samples of the segment up to the present one.
 fn regressors(past: &[[f64; 8]], flown: &[Instant]) -> DVector<f64> {
     let present = flown.len() - 1;
     let mut row = Vec::with_capacity(unknowns(past.len()));
@@ -309,13 +311,13 @@ fn regressors(past: &[[f64; 8]], flown: &[Instant]) -> DVector<f64> {
     DVector::from_vec(row)
 }
 
-/// Sums of products of a least-squares fit.
+/// Sums over steps from which the least-squares fit follows.
 struct Sums {
-    /// Products of two regressors.
+    /// Sums of the products of two regressors.
     gram: DMatrix<f64>,
-    /// Products of a regressor (row) and the rate of a state (column).
+    /// Sums of the products of a regressor (row) and the rate of a state (column).
     moments: DMatrix<f64>,
-    /// Number of steps between samples in the sums.
+    /// Number of steps in the sums.
     rows: usize,
 }
 
@@ -350,7 +352,7 @@ impl Sums {
         }
     }
 
-    /// The model with the order of the sums and the ridge of `choice`.
+    /// The model with the order and ridge of `choice`. The order must be that of the sums.
     fn arx(&self, choice: Choice, substeps: usize) -> Result<Arx, ArxError> {
         let Choice { order, ridge } = choice;
         let needed = unknowns(order);
@@ -361,8 +363,8 @@ impl Sums {
         Ok(Arx { order, substeps, slopes })
     }
 
-    /// Derivatives of the rates with respect to the regressors, with a `ridge` in the sense of [`Choice::ridge`]. `None` if one
-    /// is not finite.
+    /// Derivatives of the rates with respect to the regressors, for this `ridge` (see [`Choice::ridge`]). `None` if one is not
+    /// finite.
     fn slopes(&self, ridge: f64) -> Option<DMatrix<f64>> {
         let size = self.gram.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
         let size = DMatrix::from_diagonal(&size);

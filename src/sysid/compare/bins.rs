@@ -1,4 +1,6 @@
-//! Mean residuals of a channel in bins of the regime variables, with 95 % intervals and numbers of independent samples.
+//! Mean residuals of a channel in bins of the regime variables, with 95 % intervals and numbers of independent samples. A
+//! regime variable, such as α, locates a window in the flight envelope. A window is a stretch of flight over which a channel
+//! (force, moment or rate) is averaged with a smooth kernel.
 
 use super::bootstrap::{self, BLOCK_S, Block};
 use super::doubt::{self, NORMAL_95, Shift};
@@ -8,33 +10,35 @@ use crate::weak_form::prepared::Prepared;
 use crate::weak_form::windows::Series;
 use greylag_num::statistics::{mean, quantile};
 
-/// Smallest number of independent samples in a bin that counts as supported.
+/// Smallest number of independent samples with which a bin counts as supported.
 pub const SUPPORT: usize = 20;
-/// Intended number of bins between the outermost edges.
+/// Intended number of bins between the outermost edges of a regime variable.
 const BINS: f64 = 8.0;
 /// Intended number of bins along each side of the α–β map.
 const MAP_BINS: f64 = 10.0;
 
-/// Residual of one channel in one window, with the window's regime variables.
+/// Residual of one channel in one window, with the regime variables in the window.
 #[derive(Clone, Copy, Debug)]
 pub struct Residual {
-    /// Measured − model, in the channel's unit.
+    /// Measured minus predicted value, in the channel's unit.
     pub value: f64,
     /// Measured value, in the channel's unit.
     pub measured: f64,
     /// Index of the window's flight.
     pub flight: usize,
-    /// Index of the window's bootstrap block, ascending over all flights.
+    /// Index of the block of windows that the bootstrap resamples together, ascending over all flights.
     pub block: usize,
     /// Values of the regime variables, in the order and units of [`RegimeVariable::CONTINUOUS`].
     pub regime: [f64; RegimeVariable::CONTINUOUS.len()],
-    /// Number of independent samples that the window represents: stride of the windows divided by the kernel's length.
+    /// Number of independent samples that the window represents: distance between two windows divided by the kernel's length.
     pub weight: f64,
-    /// Change of the residual for one standard deviation of each sensor constant of the flight, in the channel's unit.
+    /// Change of the residual if a sensor error of the flight changes by one standard deviation, in the channel's unit. There
+    /// is one value for each sensor error.
     pub shift: Shift,
 }
 
-/// The finite residuals of `channel` over all flights. `series` and `shifts` hold one list for each flight.
+/// The finite residuals of `channel` over all flights. For each flight, `series` has the measured and predicted channels, and
+/// `shifts` the changes of their residuals due to sensor errors.
 pub fn residuals(
     channel: ChannelId,
     flights: &[Prepared],
@@ -69,10 +73,10 @@ pub fn independent<'a>(residuals: impl Iterator<Item = &'a Residual>) -> usize {
     residuals.map(|r| r.weight).sum::<f64>().floor() as usize
 }
 
-/// Mean residual and its 95 % interval.
+/// Mean of `residuals` and its 95 % interval.
 ///
 /// The interval is that of the block bootstrap, widened by the uncertainty of the sensor errors. `seed` and `path` select
-/// the bootstrap's random stream.
+/// the random stream of the bootstrap.
 pub fn mean_interval<'a>(
     residuals: impl Iterator<Item = &'a Residual> + Clone,
     seed: u64,
@@ -88,7 +92,7 @@ pub fn mean_interval<'a>(
     (mean, [mean - (mean - low).hypot(doubt), mean + (high - mean).hypot(doubt)])
 }
 
-/// Bins over every regime variable that varies in the flights, and over the flights if there are several.
+/// Bins over every regime variable that varies in the flights. With several flights, there is also one bin for each flight.
 pub fn all(
     residuals: &[Residual],
     flights: &[Prepared],
@@ -152,7 +156,7 @@ fn by_flight(residuals: &[Residual], flights: &[Prepared], seed: u64, channel: u
     }
 }
 
-/// Statistics of a bin. The caller sets the edges and the centre.
+/// Statistics of a bin with the residuals `members`. Its edges and its centre are NaN until the caller sets them.
 fn statistics(members: &[&Residual], seed: u64, path: &[u64]) -> Bin {
     let (mean, interval) = mean_interval(members.iter().copied(), seed, path);
     let independent = independent(members.iter().copied());
@@ -170,7 +174,7 @@ fn statistics(members: &[&Residual], seed: u64, path: &[u64]) -> Bin {
     }
 }
 
-/// Fraction of the variance that the group means explain, adjusted for the number of groups.
+/// Fraction of the residuals' variance that the means of the groups explain, adjusted for the number of groups.
 fn explained(groups: &[Vec<&Residual>]) -> f64 {
     let total: Vec<f64> = groups.iter().flatten().map(|r| r.value).collect();
     let squares = |of: &[f64]| {
@@ -186,15 +190,15 @@ fn explained(groups: &[Vec<&Residual>]) -> f64 {
     if share.is_finite() && count > k { share.clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// Fraction of the samples in each of the two open end bins: 1.2 times the fraction that supports a bin, limited to 2 to 20
-/// %.
+/// Fraction of the samples in each of the two open bins at the ends: 1.2 times the fraction that gives a bin `SUPPORT`
+/// independent samples, but at least 2 % and at most 20 %.
 fn tail(independent: usize) -> f64 {
     (1.2 * SUPPORT as f64 / independent as f64).clamp(0.02, 0.2)
 }
 
-/// Fraction of the variance that a straight line over `values` explains, adjusted for its two parameters.
+/// Fraction of the residuals' variance that a straight line over `values` explains, adjusted for its two parameters.
 ///
-/// Bins alone would be too coarse if a few extreme values cause most of the variance.
+/// It supplements the bins, which are too coarse if a few extreme values cause most of the variance.
 fn along_a_line(values: &[f64], residuals: &[Residual]) -> f64 {
     let (mx, my) =
         (mean(values), residuals.iter().map(|r| r.value).sum::<f64>() / values.len() as f64);
@@ -209,8 +213,8 @@ fn along_a_line(values: &[f64], residuals: &[Residual]) -> f64 {
     if share.is_finite() && count > 2.0 { share.clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// Round edges that divide the range between the quantiles `tail` and 1 − `tail` into about `bins` bins; `None` for a
-/// constant variable.
+/// Round numbers that divide the range between the quantiles `tail` and 1 − `tail` of `values` into about `bins` bins; `None` if
+/// the values are constant.
 fn edges(values: &[f64], bins: f64, tail: f64) -> Option<Vec<f64>> {
     let (low, high) = (quantile(values, tail), quantile(values, 1.0 - tail));
     let width = round_width((high - low) / bins);
@@ -222,7 +226,7 @@ fn edges(values: &[f64], bins: f64, tail: f64) -> Option<Vec<f64>> {
     Some((first..=last).map(|k| k as f64 * width).collect())
 }
 
-/// `width` rounded to 1, 2 or 5 times a power of ten.
+/// Rounds `width` to 1, 2 or 5 times a power of ten.
 fn round_width(width: f64) -> f64 {
     let power = 10_f64.powf(width.log10().floor());
     let lead = width / power;
@@ -267,7 +271,7 @@ pub fn map(residuals: &[Residual]) -> Map {
 
 /// Edges of the map's cells along regime variable `v` (0: α, 1: β), °.
 ///
-/// The edges lie between the 2 % and 98 % quantiles. One more cell is added at each end. Values beyond these cells are left
+/// The edges lie between the 2 % and 98 % quantiles, and one more cell is added at each end. Values beyond these cells are left
 /// out of the map. A nearly constant variable has a single cell of 1°.
 fn side(residuals: &[Residual], v: usize) -> Vec<f64> {
     let values: Vec<f64> = residuals.iter().map(|r| r.regime[v]).collect();
@@ -297,7 +301,7 @@ mod tests {
     #[test]
     fn a_step_over_alpha_is_explained_by_alpha_and_not_by_time() {
         let residual = |i: usize| {
-            // the order is permuted, so that alpha and time are not correlated
+            // alpha runs through its values in another order than time, so that the two are not correlated
             let alpha = (i * 37 % 100) as f64 / 10.0;
             let mut regime = [0.0; 13];
             (regime[0], regime[12]) = (alpha, i as f64);

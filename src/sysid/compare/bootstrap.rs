@@ -1,4 +1,4 @@
-//! Block bootstrap of the mean of samples that are correlated in time.
+//! Confidence interval of the mean of samples that are correlated in time, by a block bootstrap.
 
 use rand::RngExt;
 
@@ -10,7 +10,7 @@ pub const BLOCK_S: f64 = 1.0;
 /// Number of bootstrap resamples.
 pub const RESAMPLES: usize = 500;
 
-/// A block's contribution to a bin: sum and number of its samples.
+/// Sum and number of the samples in one block.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Block {
     /// Sum of the samples.
@@ -19,7 +19,7 @@ pub struct Block {
     pub count: f64,
 }
 
-/// Sums the values of each block. The pairs `(block, value)` must be in ascending order of the block's index.
+/// Sums the values of each block. `values` are pairs of block index and value, in ascending order of the index.
 pub fn blocks(values: impl Iterator<Item = (usize, f64)>) -> Vec<Block> {
     let mut blocks: Vec<Block> = Vec::new();
     let mut current = None;
@@ -36,9 +36,8 @@ pub fn blocks(values: impl Iterator<Item = (usize, f64)>) -> Vec<Block> {
     blocks
 }
 
-/// 95 % percentile interval of the mean by resampling whole `blocks`. NaN for fewer than two blocks.
-///
-/// `seed` and `path` select the random stream.
+/// 95 % interval of the mean over all samples, from the percentiles of resamples of whole `blocks`. NaN for fewer than two
+/// blocks. `seed` and `path` select the random stream.
 pub fn interval(blocks: &[Block], seed: u64, path: &[u64]) -> [f64; 2] {
     if blocks.len() < 2 {
         return [f64::NAN; 2];
@@ -64,8 +63,8 @@ mod tests {
 
     #[test]
     fn intervals_cover_the_mean_of_blocky_noise_about_as_often_as_they_say() {
-        // each block has 5 equal samples: an interval that treated the samples as independent would be too narrow by the
-        // factor sqrt(5) and would cover the mean in only 62 % of the cases
+        // Each block has 5 equal samples. An interval for independent samples would be too narrow by the factor sqrt(5) and
+        // would cover the true mean in only 62 % of the cases.
         let covered = (0..200)
             .filter(|&trial| {
                 let mut random = stream(trial, &[1]);
@@ -75,7 +74,8 @@ mod tests {
                 low <= 0.0 && 0.0 <= high
             })
             .count();
-        // nominal coverage 95 %; intervals from 60 blocks are slightly too narrow; 3 binomial standard deviations are 5 %
+        // The nominal coverage is 95 %, 190 of 200. Three binomial standard deviations are 5 %, 10 of 200. Intervals from
+        // 60 blocks are slightly too narrow, hence the lower limit.
         assert!((178..=200).contains(&covered), "{covered} of 200");
         assert!(interval(&blocks([(3, 1.0)].into_iter()), 1, &[]).iter().all(|x| x.is_nan()));
     }

@@ -9,14 +9,15 @@ use super::result::HorizonScore;
 use crate::flight_path::reconstruction::{Instant, Reconstruction};
 use crate::weak_form::prepared::{ClockError, Prepared};
 
-/// A run uses its disturbance only if the flight holds at least this share of [`Observer::past_s`] before it.
+/// Smallest fraction of [`Observer::past_s`] that must be recorded before the start of a run. With less, the disturbance is
+/// zero.
 const LEAST_PAST: f64 = 0.5;
 
 /// A disturbance observer that estimates the disturbance once, from the flight before the start of a run. During the run it
 /// uses no measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observer {
-    /// Time before the start of a run over which the model's error is averaged, s.
+    /// Length of the interval before the start of a run over which the model's error is averaged, s.
     pub past_s: f64,
     /// Time constant with which the disturbance decays during the run, s; infinite for a constant disturbance.
     pub decay_s: f64,
@@ -33,8 +34,8 @@ pub(super) struct Disturbance {
 }
 
 impl Observer {
-    /// The disturbance at sample `start` of `segment`: the mean difference of measured and predicted steps over the samples
-    /// before it, divided by the sampling interval. Zero if the segment begins too shortly before `start`.
+    /// Estimates the disturbance for a run from sample `start` of `segment`: mean of the measured minus the predicted steps over
+    /// the samples before it, divided by the sampling interval. It is zero if too few samples precede `start`.
     fn before(
         &self,
         model: &GreyBox,

@@ -1,10 +1,11 @@
-//! Cells in which a model fails, with a controlled false discovery rate.
+//! Finds the cells in which a model fails, with a controlled false discovery rate.
 //!
-//! A cell is a channel in a bin of a regime variable. A model has several hundred cells. By chance, one in twenty of them
-//! has a 95 % interval that excludes zero. Benjamini and Hochberg's procedure (J. R. Stat. Soc. B 57, 1995, p. 289) limits
-//! the expected fraction of such false cells among the reported cells to 5 %. Cells that share windows are positively
-//! dependent. The procedure remains valid under positive dependence (Benjamini and Yekutieli, Ann. Stat. 29, 2001, p.
-//! 1165).
+//! A cell is one channel (such as the lift) in one bin of a regime variable, which describes the flight condition (such as α).
+//! The model fails in a cell if its mean residual there is not zero. A model has several hundred cells. By chance, one in
+//! twenty of them has a 95 % interval that excludes zero. Benjamini and Hochberg's procedure (J. R. Stat. Soc. B 57, 1995, p.
+//! 289) limits the expected fraction of such false cells among the reported cells to 5 %. Cells that share samples are
+//! positively dependent. The procedure remains valid under positive dependence (Benjamini and Yekutieli, Ann. Stat. 29, 2001,
+//! p. 1165).
 
 use super::doubt::NORMAL_95;
 use super::result::{Bin, RegimeBins};
@@ -12,7 +13,7 @@ use super::result::{Bin, RegimeBins};
 /// False discovery rate among the cells reported as failing.
 pub const FALSE_SHARE: f64 = 0.05;
 
-/// Sets the q-value of every supported cell of a model. The q-values of other cells stay NaN.
+/// Sets the q-value of every cell of a model that has enough independent samples. The q-values of other cells stay NaN.
 pub fn control(channels: &mut [Vec<RegimeBins>]) {
     let mut cells: Vec<&mut Bin> = channels
         .iter_mut()
@@ -36,7 +37,8 @@ pub fn found(bin: &Bin) -> bool {
 
 /// Two-sided p-value of the hypothesis that the mean is zero.
 ///
-/// The half of the 95 % interval that faces zero is taken as 1.96 standard deviations of a normal distribution.
+/// The distance of the mean from that end of its 95 % interval which is nearer to zero counts as 1.96 standard deviations of
+/// a normal distribution.
 fn p_value(bin: &Bin) -> f64 {
     let [low, high] = bin.interval;
     let half = if bin.mean > 0.0 { bin.mean - low } else { high - bin.mean };
@@ -87,7 +89,7 @@ mod tests {
             shares += wrong as f64 / named.len().max(1) as f64;
             hits += named.len() - wrong;
         }
-        // the expected share is 0.05 × 180 / 200; its standard error over 200 trials is 0.004
+        // the expected fraction of false cells is 0.05 × 180 / 200; its standard error over 200 trials is 0.004
         assert!(shares / 200.0 < 0.06, "{}", shares / 200.0);
         // without the procedure, 95 % intervals would report 9 false cells in each trial, a third of all reported cells
         assert!(hits as f64 / (200.0 * 20.0) > 0.85, "{hits}");
@@ -100,7 +102,7 @@ mod tests {
             control(&mut channels);
             channels[0][0].bins.iter().any(found)
         });
-        // 5 % of 200; three binomial standard deviations are 9
+        // the expected count is 5 % of 200, and three binomial standard deviations are 9
         assert!(any.count() < 20);
     }
 }

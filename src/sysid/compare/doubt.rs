@@ -1,4 +1,6 @@
-//! Effect of uncertain sensor errors on each channel's residual.
+//! Effect of uncertain sensor errors on the residual (measured minus predicted value) of each channel.
+//!
+//! A channel is a force, a moment or a rate. A window is a short section of a flight over which it is averaged with a kernel.
 //!
 //! The error of an estimated sensor bias shifts the residuals of all windows of a flight equally. A bootstrap over windows
 //! does not cover this shift. The sensor constants are treated as independent, with the standard deviations that the
@@ -15,11 +17,11 @@ use greylag_physics::{Controls, State};
 /// Half width of a 95 % interval in standard deviations of a normal distribution.
 pub const NORMAL_95: f64 = 1.96;
 
-/// Adds the error of one sensor constant to an instant. The arguments are the instant, the rates of the controls (rad/s,
+/// Adds an error of one sensor constant to an instant. The arguments are the instant, the rates of the controls (rad/s,
 /// throttle 1/s), and the error in the constant's unit.
 type Move = fn(&mut Instant, &Controls, f64);
 
-/// Sensor constants that shift a residual.
+/// Sensor constants (biases, scales, delays) whose errors shift a residual.
 const CONSTANTS: [(&str, Move); COUNT] = [
     ("gyro_bias_p", |i, _, by| i.state.p += by),
     ("gyro_bias_q", |i, _, by| i.state.q += by),
@@ -39,7 +41,7 @@ const CONSTANTS: [(&str, Move); COUNT] = [
         i.controls.rudder += rate.rudder * by;
     }),
 ];
-/// Number of sensor constants that shift a residual.
+/// Number of entries of `CONSTANTS`.
 pub const COUNT: usize = 12;
 
 /// Shift of a residual for an error of one standard deviation in each constant, in the channel's unit.
@@ -93,7 +95,8 @@ fn controls_rate(samples: &[Instant], k: usize) -> Controls {
     }
 }
 
-/// Standard deviation of a mean of residuals due to the constants' errors. `shifts` holds pairs of flight index and shift.
+/// Standard deviation of a mean of residuals due to the errors of the constants. `shifts` contains a flight index and a shift
+/// for each window.
 ///
 /// Shifts add up within a flight and are independent between flights.
 pub fn deviation<'a>(shifts: impl Iterator<Item = (usize, &'a Shift)>) -> f64 {
@@ -110,7 +113,7 @@ pub fn deviation<'a>(shifts: impl Iterator<Item = (usize, &'a Shift)>) -> f64 {
     if square.is_finite() { square.sqrt() } else { 0.0 }
 }
 
-/// Root mean square, over windows, of the residual's standard deviation due to the errors of all constants.
+/// Root mean square over windows of the residual's standard deviation that the errors of all constants cause.
 pub fn level<'a>(shifts: impl Iterator<Item = &'a Shift>) -> f64 {
     let squares: Vec<f64> = shifts.map(|s| s.iter().map(|x| x * x).sum()).collect();
     if squares.is_empty() { 0.0 } else { mean(&squares).sqrt() }
@@ -124,9 +127,9 @@ mod tests {
     fn one_flight_adds_up_and_several_average_out() {
         let mut shift = [0.0; COUNT];
         (shift[6], shift[8]) = (3.0, 4.0);
-        // Ten windows of one flight shift equally; the squares of two constants' shifts add up.
+        // Ten windows of one flight shift equally. The squares of the shifts by two constants add up: 3² + 4² = 5².
         assert_eq!(deviation((0..10).map(|_| (0, &shift))), 5.0);
-        // Four flights with independent errors: half the standard deviation.
+        // With four flights of independent errors, the standard deviation is half as large.
         let four = deviation((0..40).map(|i| (i % 4, &shift)));
         assert!((four - 2.5).abs() < 1e-12, "{four}");
         assert_eq!(deviation(std::iter::empty()), 0.0);

@@ -1,9 +1,9 @@
-//! Errors of a comparison.
+//! Errors that a comparison of models with flights can return.
 
 use crate::progress::Cancelled;
 use crate::weak_form::prepared::ClockError;
 
-/// Error of a comparison.
+/// Reason why models cannot be compared with flights.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum CompareError {
     /// No model is given.

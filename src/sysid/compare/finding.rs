@@ -1,5 +1,6 @@
-//! The worst regime of a channel: the variable that explains most of the residual's variance, and the range of this variable
-//! in which the model fails.
+//! The worst regime of a channel: the flight condition in which a model fails most. A channel is a force, a moment or a rate.
+//! Its residual is the measured minus the predicted value. A regime is a range of a regime variable, such as the angle of
+//! attack. The ranges of a variable in which mean residuals are computed are called bins.
 
 use super::bins::{self, Residual, SUPPORT};
 use super::discovery;
@@ -7,16 +8,16 @@ use super::result::{Bin, Regime, RegimeBins};
 use crate::weak_form::channels::RegimeVariable;
 use crate::weak_form::prepared::Prepared;
 
-/// A variable must explain more than this fraction of the residual's variance to define a regime.
+/// A variable can define a regime only if it explains more than this fraction of the residual's variance.
 const SHARE_FLOOR: f64 = 0.1;
-/// Time, altitude and flight define a regime only if the fraction of the variance that they explain exceeds those of the
-/// other variables by this margin.
+/// The fraction of the variance that time, altitude or flight explain is reduced by this margin before it is compared with
+/// those of other variables.
 const CIRCUMSTANCE_MARGIN: f64 = 0.15;
-/// A residual mainly depends on a variable that explains more than this fraction of its variance.
+/// The residual mainly depends on a variable that explains more than this fraction of its variance.
 const FOLLOWS: f64 = 0.5;
-/// An adjacent bin belongs to the worst range if its mean is at least this fraction of the worst bin's mean.
+/// A bin next to the worst bin belongs to the regime if its mean residual is at least this fraction of the worst bin's.
 const RANGE_PART: f64 = 0.5;
-/// A flight is named as showing a regime only if it has at least this number of independent samples in the regime.
+/// A flight is listed with a regime only if it has at least this number of independent samples in it.
 const FLIGHT_SUPPORT: usize = 5;
 
 /// Trend of the residual along the variable.
@@ -32,7 +33,7 @@ pub enum Trend {
     None,
 }
 
-/// The worst regime with the residual's trend.
+/// The worst regime, and the trend of the residual.
 #[derive(Clone, Debug)]
 pub struct Finding {
     /// The regime with its range and mean residual.
@@ -41,10 +42,10 @@ pub struct Finding {
     pub trend: Trend,
 }
 
-/// The worst regime of a channel.
+/// The worst regime of the channel with index `channel`. `seed` is that of the bootstraps.
 ///
-/// If no variable defines a regime, the regime comprises all samples. `None` if the mean residual over all samples does not
-/// differ significantly from zero, or if there are too few samples.
+/// If no variable defines a regime, the regime comprises all samples. The result is then `None` if the mean residual over all
+/// samples does not differ significantly from zero, or if there are too few samples.
 pub fn worst(
     residuals: &[Residual],
     bins: &[RegimeBins],
@@ -74,7 +75,7 @@ pub fn worst(
     Some(Finding { regime, trend })
 }
 
-/// The variable on which a residual mainly depends, even if none of its bins has enough samples.
+/// The variable on which the residual mainly depends; `None` if there is none. Its bins may have too few samples for a regime.
 pub fn follows(bins: &[RegimeBins]) -> Option<RegimeVariable> {
     most_informative(bins).filter(|b| b.explained > FOLLOWS).map(|b| b.variable)
 }
@@ -83,8 +84,8 @@ fn excludes_zero([low, high]: [f64; 2]) -> bool {
     low > 0.0 || high < 0.0
 }
 
-/// Bins of the variable that explains the largest fraction of the variance. Time, altitude and flight must exceed the
-/// others by `CIRCUMSTANCE_MARGIN`.
+/// The bins of the variable that explains the largest fraction of the residual's variance, after the reduction by
+/// `CIRCUMSTANCE_MARGIN`. `None` if that fraction is not above `SHARE_FLOOR`.
 fn most_informative(bins: &[RegimeBins]) -> Option<&RegimeBins> {
     use RegimeVariable::{Altitude, Flight, Time};
     let worth = |b: &RegimeBins| {
@@ -95,7 +96,8 @@ fn most_informative(bins: &[RegimeBins]) -> Option<&RegimeBins> {
     (worth(best) > SHARE_FLOOR).then_some(best)
 }
 
-/// Whether the residual is a nearly constant offset rather than a function of the variable.
+/// Whether the residual is rather a constant than a function of the variable: the variance that the variable explains is less
+/// than a tenth of the squared mean.
 fn is_constant(residuals: &[Residual], decisive: &RegimeBins) -> bool {
     let count = residuals.len() as f64;
     let mean = residuals.iter().map(|r| r.value).sum::<f64>() / count;
@@ -103,15 +105,15 @@ fn is_constant(residuals: &[Residual], decisive: &RegimeBins) -> bool {
     decisive.explained * (square - mean * mean) < 0.1 * mean * mean
 }
 
-/// Indices of the first and the last bin of the worst range. The range contains the bin whose mean differs most
-/// significantly from zero, and adjacent bins with similar means.
+/// Indices of the first and the last bin of the regime. It contains the worst bin and the bins next to it with similar means. The
+/// worst bin is the significant one whose 95 % interval is farthest from zero. `None` if no bin is significant.
 fn range(bins: &[Bin]) -> Option<(usize, usize)> {
     let sure = |b: &Bin| b.interval[0].abs().min(b.interval[1].abs());
     let peak = (0..bins.len())
         .filter(|&k| discovery::found(&bins[k]))
         .max_by(|&a, &b| sure(&bins[a]).total_cmp(&sure(&bins[b])))?;
     let worst = bins[peak].mean;
-    // adjacent bins with few samples may join the range: together with the worst bin they have enough samples
+    // bins with too few samples may belong to the regime, because together with the worst bin they have enough
     let alike = |k: usize| bins[k].label.is_empty() && bins[k].mean / worst >= RANGE_PART;
     let from = (0..peak).rev().take_while(|&k| alike(k)).last().unwrap_or(peak);
     let to = (peak + 1..bins.len()).take_while(|&k| alike(k)).last().unwrap_or(peak);
@@ -121,7 +123,7 @@ fn range(bins: &[Bin]) -> Option<(usize, usize)> {
 fn lies_in(r: &Residual, variable: RegimeVariable, low: f64, high: f64) -> bool {
     let place = RegimeVariable::CONTINUOUS.iter().position(|v| *v == variable);
     let x = place.map_or(r.flight as f64, |v| r.regime[v]);
-    // an open end is NaN, and comparisons with NaN are false
+    // NaN stands for an open end; comparisons with NaN are false
     !(x < low || x >= high)
 }
 
@@ -152,15 +154,15 @@ fn regime(
     }
 }
 
-/// (model − measured) / measured, from the means over the windows, %. NaN unless at least 90 % of the measured values have
-/// the sign of their mean.
+/// The relative error (model − measured) / measured, %, computed from means. `mean` is the mean residual. NaN unless at least
+/// 90 % of the measured values have the sign of their mean.
 fn relative_percent(inside: &[&Residual], mean: f64) -> f64 {
     let measured = inside.iter().map(|r| r.measured).sum::<f64>() / inside.len() as f64;
     let same = inside.iter().filter(|r| r.measured * measured > 0.0).count() as f64;
     if same >= 0.9 * inside.len() as f64 { -100.0 * mean / measured } else { f64::NAN }
 }
 
-/// Trend of the supported bins' means along the variable; `Trend::None` for fewer than four supported bins.
+/// Trend of the mean residual over the bins that have enough samples; `Trend::None` for fewer than four such bins.
 fn trend(bins: &[Bin]) -> Trend {
     let known: Vec<&Bin> = bins.iter().filter(|b| b.supported).collect();
     if known.len() < 4 {
@@ -181,7 +183,7 @@ fn trend(bins: &[Bin]) -> Trend {
     }
 }
 
-/// Correlation of the bins' centres with `y`, weighted by the numbers of independent samples.
+/// Correlation of the bins' centres with `y`. Each bin has its number of independent samples as weight.
 fn correlation(bins: &[&Bin], y: impl Fn(&Bin) -> f64) -> f64 {
     let weight = |b: &Bin| b.independent as f64;
     let total: f64 = bins.iter().map(|b| weight(b)).sum();

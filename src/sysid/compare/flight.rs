@@ -1,4 +1,4 @@
-//! Result of a comparison for one flight: samples, estimated sensor errors, trace.
+//! Result of a comparison for one flight: number of samples, estimated sensor errors, states and controls over time.
 
 use crate::compare::result::{FlightResult, FlightTrace, NuisanceResult};
 use crate::flight_path::reconstruction::{Instant, Nuisance, Reconstruction};

@@ -1,4 +1,5 @@
-//! Baseline forecasts without aerodynamics: held state, straight flight, linear model (ARX).
+//! Forecasts that use no aerodynamic model, as baselines for the free runs (open-loop simulations) of a model: the state is held,
+//! the flight goes straight on, or a linear model (ARX) predicts it.
 
 use serde::Serialize;
 
@@ -8,23 +9,23 @@ use super::result::HorizonScore;
 use crate::flight_path::reconstruction::Instant;
 use crate::weak_form::prepared::Prepared;
 
-/// Free-run error of a baseline forecast, with the same starts as the free runs of the models.
+/// Errors of a baseline forecast. Its runs start at the same times as the free runs of the models.
 #[derive(Clone, Debug, Serialize)]
 pub struct ForecastResult {
     /// Name of the forecast.
     pub name: &'static str,
-    /// Error at each horizon.
+    /// Error at each horizon, the length of a run.
     pub free_run: Vec<HorizonScore>,
 }
 
-/// A rule for the next state.
+/// A rule that predicts the next state.
 pub(super) enum Forecast {
     /// The initial state is held.
     Hold,
-    /// Attitude, airspeed and flow angles are held at their initial values. The body rates are zero.
+    /// Attitude, airspeed, angle of attack and sideslip are held at their initial values. The body rates are zero.
     Straight,
-    /// A linear model with the controls as inputs (ARX), fitted by least squares. The function `forecasts` fits one of first
-    /// order to the same flights on which it computes the error. This error is therefore optimistic.
+    /// A linear model with the controls as inputs (ARX), fitted by least squares. [`forecasts`] fits a model of first order to
+    /// the flights on which it then computes the error, so that this error is optimistic.
     Linear(Arx),
 }
 
@@ -37,7 +38,7 @@ impl Forecast {
         }
     }
 
-    /// Number of samples from which the next state is computed.
+    /// Number of samples, with the present one, from which the next state is computed.
     fn order(&self) -> usize {
         match self {
             Forecast::Hold | Forecast::Straight => 1,
@@ -45,8 +46,8 @@ impl Forecast {
         }
     }
 
-    /// The state `dt` (s) after `past[0]`. `past` has the present state and those before it, the newest first; `flown` has the
-    /// samples of the segment up to the present one.
+    /// The predicted state `dt` (s) after the present one. `past` has the present state and those before it, the newest first.
+    /// `flown` has the recorded samples of the segment up to the present one.
     fn next(&self, past: &[[f64; 8]], flown: &[Instant], dt: f64) -> [f64; 8] {
         match self {
             Forecast::Hold => past[0],
@@ -58,8 +59,8 @@ impl Forecast {
         }
     }
 
-    /// One run from sample `start` of `segment`. Returns the measured and predicted state after each number of steps in
-    /// `looks`.
+    /// Makes one run from sample `start` of `segment`. Returns the measured and the predicted state after each number of steps in
+    /// `looks` that the segment reaches; `None` once the run has diverged. Errors are divided by `scale` to detect this.
     pub(super) fn run(
         &self,
         segment: &[Instant],
@@ -87,16 +88,16 @@ impl Forecast {
     }
 }
 
-/// Free-run errors of all forecasts on `flights` at the `horizons` (s). The errors of the states are divided by `scale`. The
-/// linear model is fitted to the same flights.
+/// Errors of all forecasts on `flights` at the `horizons` (s). The errors of the states are divided by `scale`. The linear model
+/// is fitted to the same flights.
 pub fn forecasts(flights: &[Prepared], scale: [f64; 8], horizons: &[f64]) -> Vec<ForecastResult> {
     let linear = Arx::first_order(flights).map(Forecast::Linear);
     let all = [Forecast::Hold, Forecast::Straight].into_iter().chain(linear);
     results(all, flights, scale, horizons)
 }
 
-/// Free-run errors of all forecasts on `flights` at the `horizons` (s). The errors of the states are divided by `scale`. The
-/// linear model, of first order, is fitted to the flights `seen`; one of another order is an [`Arx`].
+/// Errors of all forecasts on `flights` at the `horizons` (s). The errors of the states are divided by `scale`. The linear model
+/// is of first order and is fitted to the other flights `seen`.
 pub fn on_unseen(
     seen: &[Prepared],
     flights: &[Prepared],
@@ -121,8 +122,7 @@ fn results(
     .collect()
 }
 
-/// Free-run errors of `forecast` on `flights`, one for each of the `horizons` (s). The errors of the states are divided by
-/// `scale`.
+/// Errors of `forecast` on `flights`, one for each of the `horizons` (s). The errors of the states are divided by `scale`.
 pub(super) fn scores(
     forecast: &Forecast,
     flights: &[Prepared],
@@ -134,7 +134,7 @@ pub(super) fn scores(
     horizons.iter().map(|h| runs.score(*h)).collect()
 }
 
-/// The runs of one flight, with the same starts as the free runs of the models.
+/// The runs of `forecast` along one flight. They start at the same times as the free runs of the models.
 fn flown(
     forecast: &Forecast,
     flight: &Prepared,
@@ -198,7 +198,7 @@ mod tests {
         let all = forecasts(&[flight()], [1.0; 8], &[1.0, 5.0]);
         let at_5: Vec<f64> = all.iter().map(|f| f.free_run[1].rmse_scaled).collect();
         let [hold, straight, linear] = at_5[..] else { panic!("{at_5:?}") };
-        // pitch oscillates by 0.1 rad; throttle and airspeed are constant
+        // pitch oscillates by 0.1 rad, which the first two forecasts do not predict
         assert!(hold > 0.01 && straight > 0.01 && linear < 1e-6, "{at_5:?}");
         // 20 s contain 7 starts, one every 3 s
         assert_eq!(all[0].free_run[0].runs, 7);

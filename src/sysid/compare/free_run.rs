@@ -1,4 +1,5 @@
-//! Free runs: the model is integrated from reconstructed states with the recorded deflections.
+//! Free runs: the model is integrated from reconstructed states with the recorded deflections, without feedback from the
+//! measurements. x_c is the scale by which the error of each state is divided.
 
 use std::f64::consts::{PI, TAU};
 
@@ -16,30 +17,30 @@ use greylag_physics::State;
 /// Time between the starts of two free runs, s.
 pub const START_EVERY_S: f64 = 3.0;
 /// A run has diverged once its scaled error (root mean square over the states of error / x_c) exceeds this bound. The scaled
-/// error is 1, for example, if the error of every state equals its scale x_c: 1 rad, V0, 2 V0/b and so on.
+/// error is 1, for example, if the error of every state equals its scale: 1 rad for angles, V0 for airspeed, and so on.
 pub const DIVERGENCE_BOUND: f64 = 1.0;
-/// Number of points of the growth curve.
+/// Number of points of the growth curve, which shows the error over the time since the start of a run.
 pub const GROWTH_POINTS: usize = 25;
 
-/// Measured and predicted state at a sampled time; `None` once the run has diverged.
+/// Measured and predicted state of a run at one time; `None` once the run has diverged.
 pub(super) type Look = Option<[[f64; 8]; 2]>;
 
 /// All free runs of a model over all flights.
 pub struct Runs {
-    /// Sampled times, s after the start, ascending.
+    /// Times at which the errors are evaluated, s after the start of a run, ascending.
     times: Vec<f64>,
-    /// Samples of each run, up to the end of its segment.
+    /// For each run: its states at `times`, up to the end of its segment (stretch of a flight without gaps).
     runs: Vec<Vec<Look>>,
     scale: [f64; 8],
 }
 
-/// The predicted states of free runs that restart every [`START_EVERY_S`]. The times are those of
+/// The predicted states of free runs that restart every [`START_EVERY_S`], one list for each state. The times are those of
 /// [`FlightTrace`](super::result::FlightTrace), the order and the units those of `State::NAMES`.
 pub type Trace = [Vec<f64>; 8];
 
-/// Free runs of `model` over all `flights`, sampled at the `horizons` (s) and at the points of the growth curve up to the
-/// longest horizon. Constants of a flight in the model's file (trims, sensor errors) are applied to that flight. Returns
-/// also one trace for each flight.
+/// Makes free runs of `model` over all `flights`. They are evaluated at the `horizons` (s) and at the points of the growth
+/// curve up to the longest horizon. Constants of a flight in the model's file (trims, sensor errors) are applied to that
+/// flight. Returns also one trace for each flight.
 pub fn fly(model: &GreyBox, flights: &[Prepared], horizons: &[f64]) -> (Runs, Vec<Trace>) {
     fly_with(model, flights, horizons, None)
 }
@@ -73,7 +74,7 @@ pub fn fly_with(
     (Runs { times, runs, scale: model.scale() }, traces)
 }
 
-/// Largest relative difference between a horizon and the time of the sample at which its error is computed.
+/// Largest accepted relative difference between a horizon and the time of the sample at which its error is computed.
 const UNEVEN: f64 = 0.25;
 
 /// A note for each flight and horizon (s) for which no sample is close to the horizon. `steps` holds the names of the
@@ -94,7 +95,7 @@ pub fn uneven(steps: &[(&str, f64)], horizons: &[f64]) -> Vec<String> {
     notes
 }
 
-/// Converts the states of `trace` to those that the flight's sensors would measure, sensor errors included.
+/// Adds the sensor errors of the flight to the states of `trace`, so that they are comparable with its measurements.
 fn measured_from(trace: &mut Trace, known: &KnownFlight) {
     for k in 0..trace[0].len() {
         let state = known.as_measured(std::array::from_fn(|i| trace[i][k]));
@@ -181,8 +182,8 @@ pub fn from_moment(model: &GreyBox, flight: &Prepared, time_s: f64, seconds: f64
     Some(path)
 }
 
-/// Integrates one run from sample `start`. Returns the measured and the predicted state after each number of steps in
-/// `looks`, and the predicted states of the first `keep` samples.
+/// Integrates one run from sample `start`. `looks` holds numbers of steps, and `keep` one number of samples. Returns the
+/// measured and the predicted state after each number of steps, and the predicted states of the first `keep` samples.
 fn run(
     model: &GreyBox,
     flight: &Prepared,
@@ -231,8 +232,8 @@ fn run(
     (seen, path)
 }
 
-/// Predicted − measured states, in the units of `State::NAMES`, with roll wrapped to ±π. The weak form and the report use
-/// the opposite sign.
+/// Predicted − measured states, in the units of `State::NAMES`, with the roll error wrapped to ±π. Residuals in the report
+/// are measured − predicted.
 pub fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
     let mut error: [f64; 8] = std::array::from_fn(|k| predicted[k] - measured[k]);
     error[0] = (error[0] + PI).rem_euclid(TAU) - PI;
@@ -245,7 +246,7 @@ pub(super) fn scaled(error: &[f64; 8], scale: &[f64; 8]) -> f64 {
 }
 
 impl Runs {
-    /// Combines `runs`, each sampled at the `times` (s). `scale` is the scale x_c of each state.
+    /// Combines `runs`, which are evaluated at the `times` (s). `scale` is the scale x_c of each state.
     pub(super) fn new(times: Vec<f64>, runs: Vec<Vec<Look>>, scale: [f64; 8]) -> Runs {
         Runs { times, runs, scale }
     }
@@ -255,7 +256,7 @@ impl Runs {
         place.map_or(Vec::new(), |k| self.runs.iter().filter_map(|r| r.get(k).copied()).collect())
     }
 
-    /// Scaled error of each run at one time. The error of a diverged run is [`DIVERGENCE_BOUND`].
+    /// Scaled errors of `looks`, the states of all runs at one time. The error of a diverged run is [`DIVERGENCE_BOUND`].
     fn errors(&self, looks: &[Look]) -> Vec<f64> {
         let one = |look: &Look| match look {
             Some([measured, predicted]) => scaled(&error(measured, predicted), &self.scale),
@@ -264,13 +265,13 @@ impl Runs {
         looks.iter().map(one).collect()
     }
 
-    /// Scaled error of each run at `horizon_s` (s), one of the sampled times. The error of a diverged run is
+    /// Scaled error of each run at `horizon_s` (s), one of the evaluated times. The error of a diverged run is
     /// [`DIVERGENCE_BOUND`].
     pub fn scaled_errors(&self, horizon_s: f64) -> Vec<f64> {
         self.errors(&self.at(horizon_s))
     }
 
-    /// The errors over all runs at `horizon_s` (s), one of the sampled times.
+    /// The errors over all runs at `horizon_s` (s), one of the evaluated times.
     pub fn score(&self, horizon_s: f64) -> HorizonScore {
         let looks = self.at(horizon_s);
         let diverged = looks.iter().filter(|l| l.is_none()).count();
@@ -305,7 +306,7 @@ impl Runs {
     /// RMSE, R², Theil's U and Theil's proportions for state number `k`.
     fn state_score(&self, k: usize, runs: &[[[f64; 8]; 2]]) -> StateScore {
         let measured: Vec<f64> = runs.iter().map(|r| r[0][k]).collect();
-        // measured plus wrapped error: a roll error across ±180° is then the smaller angle
+        // the error is wrapped, so that a measured roll of 179° and a predicted one of −179° differ by 2°
         let predicted: Vec<f64> = runs.iter().map(|r| r[0][k] + error(&r[0], &r[1])[k]).collect();
         let errors: Vec<f64> = predicted.iter().zip(&measured).map(|(a, b)| a - b).collect();
         let rmse = root_mean_square(&errors);
@@ -326,7 +327,7 @@ impl Runs {
     }
 }
 
-/// `x`, or 0 if it is negative. An undefined `x` stays NaN, which `f64::max` would replace by 0.
+/// Returns `x`, or 0 if `x` is negative. A NaN stays NaN, which `f64::max` would replace by 0.
 fn at_least_zero(x: f64) -> f64 {
     if x < 0.0 { 0.0 } else { x }
 }

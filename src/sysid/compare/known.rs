@@ -1,12 +1,14 @@
-//! Free-run errors with and without the constants of the compared flights in a model's file.
+//! Prediction errors with and without the constants of flights that a model's file holds, such as sensor errors and trims.
+//!
+//! The errors are those of free runs: simulations of the model with the recorded controls.
 
 use super::free_run;
 use super::result::{HorizonScore, KnownUse};
 use crate::weak_form::prepared::Prepared;
 use greylag_model::GreyBox;
 
-/// The flights with constants in the file of `model`, and the free-run errors of all flights without these constants, at
-/// `horizons_s` (s). `None` if the file has no constants for these flights.
+/// The flights for which the file of `model` has constants, and the free-run errors over all flights without the constants,
+/// at `horizons_s` (s). `None` if the file has no constants for these flights.
 pub fn used(model: &GreyBox, flights: &[Prepared], horizons_s: &[f64]) -> Option<KnownUse> {
     let (own, shared): (Vec<&Prepared>, Vec<_>) =
         flights.iter().partition(|f| model.known.names(&f.name));
@@ -24,8 +26,8 @@ pub fn used(model: &GreyBox, flights: &[Prepared], horizons_s: &[f64]) -> Option
 }
 
 impl KnownUse {
-    /// Sentence on the constants used, with the errors `with` and without the constants at the longest horizon that a run
-    /// reaches. `None` if no run reaches any horizon.
+    /// Sentence about the constants, and about the errors with them (`with`) and without them at the longest horizon that a
+    /// run reaches. `None` if no run reaches any horizon.
     pub fn sentence(&self, with: &[HorizonScore]) -> Option<String> {
         let reached = with.iter().zip(&self.without).filter(|(a, b)| a.runs > 0 && b.runs > 0);
         let both = reached.max_by(|(a, _), (b, _)| a.horizon_s.total_cmp(&b.horizon_s))?;

@@ -1,6 +1,8 @@
-//! Comparison of models with flights: free-run errors, and the channels and regimes in which a model fails.
+//! Comparison of models with flights: errors of free runs (open-loop simulations), and the channels and regimes in which a
+//! model fails.
 //!
-//! The method is described in `docs/explanation/comparison.md`. Models are compared as given, without tuning.
+//! A channel is a force, a moment or a rate. A regime is a range of a flight condition, such as the angle of attack. The method
+//! is described in `docs/explanation/comparison.md`. Models are compared as given, without a fit.
 
 pub mod answer;
 pub mod arx;

@@ -1,7 +1,9 @@
 //! The result of a comparison, as plain data for the terminal, the JSON and the report.
 //!
 //! Residuals are measured − model: a positive residual means that the model is too low. An undefined number is NaN, written
-//! as `null` in JSON.
+//! as `null` in JSON. A free run is an open-loop simulation on the recorded controls. A channel is a force, a moment or the
+//! rate of V, α or β. In weak form it is averaged with a smooth kernel over short windows. A regime is a range of a regime
+//! variable, for example of α, and contains the windows in this range.
 
 use serde::Serialize;
 
@@ -84,7 +86,7 @@ pub struct ModelResult {
     /// Free-run error at each horizon.
     pub free_run: Vec<HorizonScore>,
     /// Flights for which `free_run` uses constants in the model's file, and the errors without these constants; `None` if
-    /// the file has none for these flights.
+    /// the file has no constants for these flights.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub known: Option<KnownUse>,
     /// Growth of the free-run error with time, from the start to the longest horizon.
@@ -96,7 +98,7 @@ pub struct ModelResult {
     pub traces: Vec<ModelTrace>,
 }
 
-/// Flights for which a model's file has constants, and the free-run errors without these constants.
+/// Flights for which a model's file has constants (trims, misalignment, sensor errors), and the free-run errors without these.
 #[derive(Clone, Debug, Serialize)]
 pub struct KnownUse {
     /// Names of the flights with a table `[flights.NAME]` in the file.
@@ -194,16 +196,16 @@ pub struct ChannelResult {
     /// Mean square residual less noise, divided by the measured variance less noise. At 0 the model explains all variance
     /// beyond noise; above 1 the model is worse than a constant. NaN if the measured variance hardly exceeds the noise.
     pub unexplained_fraction: f64,
-    /// RMS rate of the scaled state error (error / x_c) that the residual beyond noise causes, 1/s. The values of different
+    /// RMS rate at which the residual beyond noise drives the scaled state error (error / x_c), 1/s. The values of different
     /// channels are comparable.
     pub effect_per_s: f64,
     /// Fraction of the mean square residual due to a constant offset, 0..1.
     pub offset_share: f64,
-    /// The worst regime in one sentence.
+    /// Sentence on the regime in which the model fails most.
     pub worst_regime: String,
     /// Reason why these flights do not suffice to assess the model in this channel; `None` if they suffice.
     pub abstained: Option<&'static str>,
-    /// The worst regime as numbers; `None` if the mean residual of no supported regime differs from zero.
+    /// The same regime as numbers; `None` if the mean residual of no supported regime differs from zero.
     pub regime: Option<Regime>,
     /// Mean residual over each regime variable.
     pub bins: Vec<RegimeBins>,
@@ -234,17 +236,17 @@ pub struct RegimeBins {
     /// Fraction of the residual's variance that the bins or a straight line explain, whichever is larger, 0..1. It is
     /// adjusted for the number of parameters.
     pub explained: f64,
-    /// Bins in ascending order of the variable. For the variable flight, one bin for each flight in the order of the
-    /// flights.
+    /// Bins in ascending order of the variable. If the variable is the flight, there is one bin for each flight, in the order
+    /// of the flights.
     pub bins: Vec<Bin>,
 }
 
 /// Mean residual in a bin.
 #[derive(Clone, Debug, Serialize)]
 pub struct Bin {
-    /// Lower edge in the variable's unit; for the variable flight, the flight's index − 0.5. NaN if open.
+    /// Lower edge in the variable's unit, or the flight's index − 0.5 if the variable is the flight. NaN if open.
     pub low: f64,
-    /// Upper edge in the variable's unit; for the variable flight, the flight's index + 0.5. NaN if open.
+    /// Upper edge in the variable's unit, or the flight's index + 0.5 if the variable is the flight. NaN if open.
     pub high: f64,
     /// Mean of the variable over the bin's windows, in the variable's unit.
     pub center: f64,
@@ -313,11 +315,11 @@ pub struct Regime {
     pub relative_percent: f64,
     /// Number of independent samples.
     pub independent: usize,
-    /// Names of the flights in which the mean residual has the same sign, from enough samples.
+    /// Names of the flights with enough samples in the regime whose own mean residual there has the sign of `mean`.
     pub flights: Vec<String>,
 }
 
-/// One flight as compared.
+/// A flight of the comparison.
 #[derive(Clone, Debug, Serialize)]
 pub struct FlightResult {
     /// Name of the flight, from its file.

@@ -1,4 +1,4 @@
-//! Comparison of every model with every flight: free runs, channel residuals and findings.
+//! Compares models with recorded flights by free runs (open-loop simulations) and by the residuals of forces and moments.
 
 use rayon::prelude::*;
 
@@ -30,7 +30,7 @@ use crate::weak_form::prepared::{ClockError, Prepared};
 use crate::weak_form::windows::{self, Series};
 use greylag_model::GreyBox;
 
-/// This constant and the next two are reasons why a model is not assessed in a channel.
+/// This text and the next two are reasons why a model is not assessed in a channel (a force, a moment or a rate).
 const UNMOVED: &str = "these flights do not move it above the sensors' noise";
 const NOISE_UNKNOWN: &str =
     "its noise cannot be computed, because the model predicts no number beside a measured state";
@@ -51,11 +51,9 @@ impl Default for Options {
     }
 }
 
-/// Compares `models` with reconstructed `flights`. `progress` receives the stages and may cancel.
-///
+/// Compares each of `models` with the reconstructed `flights`. `progress` receives the stages and may cancel.
 /// # Errors
-/// No model or flight is given, no log holds a usable flight, the sampling interval of a flight or a horizon is not
-/// usable, or `progress` cancelled.
+/// No model, flight or usable log is given, a sampling interval or a horizon is not usable, or `progress` cancelled.
 pub fn compare(
     models: &[GreyBox],
     flights: &[Reconstruction],
@@ -108,7 +106,7 @@ pub fn compare(
     })
 }
 
-/// Free-run errors of `model` over `flights`, one for each of `horizons_s` (s).
+/// Errors of the free runs of `model` along `flights`, one for each of `horizons_s` (lengths of the runs, s).
 ///
 /// # Errors
 /// The sampling interval of a flight is not usable: see `ClockError`.
@@ -126,8 +124,7 @@ pub fn scores(
 
 type Usable<'a> = (Vec<&'a Reconstruction>, Vec<Prepared>, Vec<String>);
 
-/// The flights that can be compared (as reconstructions and prepared), with notes on the flights that are left out.
-/// `slowest` is the airspeed at which flight begins, m/s.
+/// The flights that can be compared, and notes on the others. An aircraft counts as flying above the airspeed `slowest` (m/s).
 fn usable(flights: &[Reconstruction], slowest: f64) -> Result<Usable<'_>, CompareError> {
     if flights.is_empty() {
         return Err(CompareError::NoLog);
@@ -175,7 +172,6 @@ fn why_unusable(flight: &Reconstruction, slowest: f64) -> String {
     }
 }
 
-/// A note for each horizon (s) that is longer than the longest segment.
 fn short_of(flights: &[Prepared], horizons: &[f64]) -> Vec<String> {
     let longest = flights
         .iter()
@@ -221,8 +217,7 @@ fn one_model(
     }
 }
 
-/// Decides for each measured channel whether `flights` suffice to assess `model`.
-///
+/// For each measured channel: whether `flights` suffice to assess `model` in it, and whether `model` certainly errs in it.
 /// # Errors
 /// There is no flight, no flight is usable, or the sampling interval of a flight is not usable.
 pub fn abstentions(
@@ -243,7 +238,6 @@ pub fn abstentions(
 
 type Measured = (Vec<Vec<Series>>, Vec<Vec<[Shift; ChannelId::ALL.len()]>>);
 
-/// Measured and predicted channels of `flights`, and the shifts of their residuals due to uncertain sensor errors.
 fn seen(model: &GreyBox, flights: &[Prepared], from: &[&Reconstruction]) -> Measured {
     let of = |f: &Prepared| match KnownFlight::of(model, f) {
         Some(known) => windows::channels(&known.model, &known.flight),
@@ -255,14 +249,13 @@ fn seen(model: &GreyBox, flights: &[Prepared], from: &[&Reconstruction]) -> Meas
     (series, shifts.collect())
 }
 
-/// Flights with the channels and residual shifts of one model, one entry for each flight.
+/// Flights, their channels (measured and predicted), and the changes of the residuals due to uncertain sensor errors.
 struct Seen<'a> {
     flights: &'a [Prepared],
     series: &'a [Vec<Series>],
     shifts: &'a [Vec<[Shift; ChannelId::ALL.len()]>],
 }
 
-/// The results of all channels that the flights measure.
 fn all_channels(model: &GreyBox, seen: &Seen, seed: u64) -> Vec<ChannelResult> {
     let Seen { flights, series, shifts } = *seen;
     let cut = |(k, id): (usize, &ChannelId)| {
@@ -329,18 +322,17 @@ fn channel(
     }
 }
 
-/// Reason for an undefined (NaN) unexplained fraction of a channel with `power`.
 fn unknown(power: &Power) -> &'static str {
     if power.noise.is_nan() { NOISE_UNKNOWN } else { UNMOVED }
 }
 
-/// Rate of the scaled state error (error / x_c) that one unit of a channel causes, 1/s per unit.
+/// Rate at which a residual of one unit in a channel changes the error of a state divided by its scale, 1/s per unit.
 fn leverage(model: &GreyBox, id: ChannelId) -> f64 {
     let [_, _, v, p, q, r, alpha, beta] = model.scale();
     let body = &model.body;
     match id {
         ChannelId::Drag => 1.0 / (body.mass * v),
-        // a force F normal to the path turns the path at the rate F / (m V)
+        // a force F normal to the flight path turns it at the rate F / (m V)
         ChannelId::Lift => 1.0 / (body.mass * v * alpha),
         ChannelId::Side => 1.0 / (body.mass * v * beta),
         ChannelId::Roll => 1.0 / (body.jx * p),
@@ -352,7 +344,6 @@ fn leverage(model: &GreyBox, id: ChannelId) -> f64 {
     }
 }
 
-/// Mean noise variance over the windows of all flights, in the channel's unit squared.
 fn noise(id: ChannelId, series: &[Vec<Series>]) -> f64 {
     let own = || series.iter().flatten().filter(|s| s.channel == id);
     let windows = |s: &Series| s.measured.iter().filter(|x| x.is_finite()).count() as f64;

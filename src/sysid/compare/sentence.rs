@@ -1,27 +1,29 @@
-//! Wording of a channel's finding as one sentence.
+//! Words the result of a comparison for one channel as a sentence. A channel is a force, a moment or the rate of a state. The
+//! residual is its measured minus its modelled value. A regime is a range of a variable, such as α > 9°, in which the
+//! residual is evaluated.
 
 use super::finding::{Finding, Trend};
 use super::result::Regime;
 use crate::weak_form::channels::{ChannelId, RegimeVariable};
 
-/// A channel counts as explained if the unexplained fraction of its variance is below this.
+/// A channel counts as explained if the model leaves less than this fraction of its variance unexplained.
 const EXPLAINED: f64 = 0.01;
 /// Unexplained fraction of the variance below which the sentence names no regime.
 pub const NOTHING_LEFT: f64 = 0.001;
 
-/// Quantities from which the sentence of a channel is written.
+/// Results from which the sentence of a channel is written.
 pub struct Subject<'a> {
     /// Identifier of the channel.
     pub channel: ChannelId,
-    /// Unexplained fraction of the channel's variance; NaN if it is not defined.
+    /// Fraction of the channel's variance that the model leaves unexplained; NaN if it is not known.
     pub unexplained: f64,
     /// Reason for a NaN in `unexplained`.
     pub unknown: &'a str,
-    /// Worst regime of the channel; `None` if there is none.
+    /// The regime in which the model is worst; `None` if it is not surely wrong in any.
     pub finding: Option<&'a Finding>,
     /// The variable on which the residual mainly depends; `None` if there is none.
     pub follows: Option<RegimeVariable>,
-    /// Whether the 95 % uncertainty of the sensor errors may explain the whole residual.
+    /// Whether sensor errors within their 95 % uncertainty may explain the whole residual.
     pub within_doubt: bool,
     /// Mass of the aircraft in the model, kg.
     pub mass: f64,
@@ -29,11 +31,10 @@ pub struct Subject<'a> {
     pub flights: usize,
 }
 
-/// Unexplained fraction of the variance above which the sentence states no percentage, because the channel is hardly
-/// excited.
+/// Unexplained fraction of the variance above which the sentence states no percentage. The channel is then hardly excited.
 const QUIET: f64 = 9.995;
 
-/// The sentence without a full stop; the first letter is lower case.
+/// The sentence, without a full stop and beginning with a lower-case letter.
 pub fn sentence(subject: &Subject) -> String {
     let noun = noun(subject.channel);
     if subject.unexplained.is_nan() {
@@ -94,7 +95,7 @@ fn noun(channel: ChannelId) -> &'static str {
     }
 }
 
-/// Descriptions of the model's error for a positive and a negative residual (measured − model).
+/// Descriptions of the model's error, first for a positive residual (measured − model), then for a negative one.
 fn directions(channel: ChannelId) -> (&'static str, &'static str) {
     match channel {
         // the channel is drag less thrust, the sentence describes the forward force
@@ -111,7 +112,8 @@ fn directions(channel: ChannelId) -> (&'static str, &'static str) {
 /// The model's error in words: "8.2 ± 0.3 N too low" or "28 ± 4 % too high".
 fn error(subject: &Subject, regime: &Regime) -> String {
     let [least, most] = regime.interval;
-    // the half width towards zero is used: an interval that excludes zero must not appear to include zero
+    // The interval may not be symmetric. The half width on the side of zero is printed, so that an interval without zero
+    // does not appear to contain zero.
     let half = if regime.mean > 0.0 { regime.mean - least } else { most - regime.mean };
     let (low, high) = directions(subject.channel);
     if subject.channel == ChannelId::Lift && regime.relative_percent.is_finite() {
@@ -134,8 +136,8 @@ fn error(subject: &Subject, regime: &Regime) -> String {
     }
 }
 
-/// Phrase on the error of a moment relative to the measured moment. Empty for other channels, and if the measured moment
-/// changes its sign in the regime.
+/// Phrase on the error of a moment relative to the measured moment. It is empty for other channels, and if the measured
+/// moment does not keep its sign in the regime.
 fn strength(channel: ChannelId, regime: &Regime) -> String {
     let moment = matches!(channel, ChannelId::Roll | ChannelId::Pitch | ChannelId::Yaw);
     match regime.relative_percent {
@@ -146,7 +148,7 @@ fn strength(channel: ChannelId, regime: &Regime) -> String {
     }
 }
 
-/// The regime in words (" for α > 9°") with the residual's trend along the variable.
+/// The regime in words (" for α > 9°"), with the trend of the residual over the regime's variable.
 fn place(subject: &Subject, Finding { regime, trend }: &Finding) -> String {
     let Some(variable) = regime.variable else {
         let along = subject.follows.map(|v| format!(", and the error follows {}", spoken(v)));
@@ -177,7 +179,7 @@ fn spoken(variable: RegimeVariable) -> &'static str {
     }
 }
 
-/// The range in words: "α > 9°", "throttle 0.2 to 0.4", "the aileron moving right faster than 20 °/s".
+/// The range of the variable in words: "α > 9°", "throttle 0.2 to 0.4", "the aileron moving right faster than 20 °/s".
 fn range(regime: &Regime, variable: RegimeVariable) -> String {
     use RegimeVariable::{AileronRate, ElevatorRate};
     let (low, high) = (regime.low, regime.high);
@@ -211,7 +213,7 @@ fn between(low: f64, high: f64, unit: &str) -> String {
     }
 }
 
-/// Number of samples and flights in words: "210 samples, both flights".
+/// The numbers of samples and flights of the regime in words: "210 samples, both flights".
 fn who(regime: &Regime, flights: usize) -> String {
     let seen = regime.flights.len();
     let who = match (seen, flights) {
@@ -224,7 +226,7 @@ fn who(regime: &Regime, flights: usize) -> String {
     format!("{} samples, {who}", regime.independent)
 }
 
-/// Value and uncertainty, rounded to the significant figures of the uncertainty: "8.2 ± 0.3".
+/// Value and uncertainty, rounded to the decimals of the uncertainty: "8.2 ± 0.3".
 fn plus_minus(value: f64, half: f64) -> String {
     if !(half.is_finite() && half > 0.0) {
         return significant(value, 3);
@@ -320,7 +322,7 @@ mod tests {
 
     #[test]
     fn forces_and_moments_say_their_direction_in_words() {
-        // measured drag less thrust is 8.2 N lower than the model's: the forward force of the model is too low
+        // drag minus thrust as measured is 8.2 N below that of the model, so the model's forward force is too low
         let at = regime(RegimeVariable::Throttle, 0.4, f64::NAN, -8.2, 0.31);
         assert_eq!(
             say(ChannelId::Drag, at, Trend::Grows),

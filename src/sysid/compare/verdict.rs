@@ -1,14 +1,18 @@
-//! Order of a model's findings in the report, and warnings on its free runs.
+//! Orders the sentences about a model in the report, and warns if its predictions are poor.
+//!
+//! The predictions are free runs: simulations of the model with the recorded controls. A channel is a component of force or
+//! moment, or the rate of a state. Its residual is the difference between measurement and model, averaged over windows.
 
 use super::forecast::ForecastResult;
 use super::result::{ChannelResult, HorizonScore};
 use crate::weak_form::channels::ChannelId;
 use crate::weak_form::windows::Series;
 
-/// Sentences on a model. The worst force and the worst moment come first, then the other channels.
+/// Sentences about a model. A warning about divergence comes first, then the worst force and the worst moment, then the other
+/// channels.
 ///
-/// Forces drive V, α, β; moments drive p, q, r. The rates of V, α and β contain the same information as the forces. They are
-/// left out if the logs contain the forces.
+/// Forces drive V, α, β; moments drive p, q, r. The rates of V, α and β contain the same information as the forces. The rates
+/// are left out if the logs contain the forces.
 pub fn sentences(free_run: &[HorizonScore], channels: &[ChannelResult]) -> Vec<String> {
     use ChannelId::{Drag, Lift, Pitch, Roll, Side, Yaw};
     let is_force = |c: &&ChannelResult| matches!(c.channel, Drag | Lift | Side);
@@ -30,8 +34,9 @@ pub fn sentences(free_run: &[HorizonScore], channels: &[ChannelResult]) -> Vec<S
     diverges(free_run).into_iter().chain(stated).collect()
 }
 
-/// The part of a channel's `effect_per_s` that is due to the mean residual and to the regime variable that explains most of
-/// the residual's variance, 1/s.
+/// Rate of the state error that the systematic part of a channel's residual causes, 1/s. The systematic part consists of the
+/// mean residual, and of the residual's dependence on one regime variable (flight condition). The variable is the one that
+/// explains most of the residual's variance.
 fn weight(channel: &ChannelResult) -> f64 {
     let share = channel.bins.iter().map(|b| b.explained).fold(0.0, f64::max);
     let weight = channel.offset_share + (1.0 - channel.offset_share) * share;
@@ -71,8 +76,8 @@ pub fn beaten(free_run: &[HorizonScore], forecasts: &[ForecastResult]) -> Option
     ))
 }
 
-/// A warning if predictions of the model over the flights' `series` are not numbers, for example the square root of a
-/// negative angle. These windows have no residual and are not in the channels' results.
+/// A warning if the model predicts NaN in some windows of `series`, for example from the square root of a negative angle.
+/// These windows have no residual and do not enter the channels' results.
 pub fn unpredicted(series: &[Vec<Series>]) -> Option<String> {
     let of = |channel: &ChannelId| {
         let own = series.iter().flatten().filter(|s| s.channel == *channel);

@@ -1,4 +1,4 @@
-//! Errors of a diagnosis.
+//! Errors of a diagnosis, which searches for effects that a model lacks.
 
 use crate::progress::Cancelled;
 use crate::weak_form::prepared::ClockError;
@@ -32,7 +32,7 @@ pub enum DiagnoseError {
         /// The variables that hardly move, with the size of their motion, in words.
         what: String,
     },
-    /// No channel's residual can be computed.
+    /// The residual (measured minus predicted value) cannot be computed in any channel.
     #[error(
         "cannot diagnose {model}: its residuals cannot be computed over these flights; check its figures \
          with `greylag compare` first"
@@ -41,7 +41,7 @@ pub enum DiagnoseError {
         /// Name of the model.
         model: String,
     },
-    /// An effect that is to be added to or excluded from the candidates is unknown.
+    /// The user adds an unknown effect to the candidates, or excludes an unknown one.
     #[error(
         "cannot try or leave out effect {id:?}: it is unknown; `greylag effects list` names those there are"
     )]

@@ -1,10 +1,10 @@
-//! Diagnosis of a model: finds the physical effects that it lacks. Candidate effects are ranked by their evidence,
-//! which must exceed a critical value. Bootstrap draws under the null hypothesis that no effect is missing determine
-//! this value.
+//! Diagnosis of a model: finds the physical effects that it lacks. Candidate effects are ranked by their evidence, which must
+//! exceed a critical value. The critical value is determined by bootstrap draws under the null hypothesis that no effect is
+//! missing.
 //!
-//! The method is described in `docs/explanation/diagnosis.md`. Flights must be reconstructed with their deflections as
-//! recorded ([`ActuatorClock::AsRecorded`](crate::flight_path::ActuatorClock)), because the diagnosis itself separates
-//! clock errors from physical effects.
+//! The method is described in `docs/explanation/diagnosis.md`. Flights must be reconstructed with their deflections as recorded
+//! ([`ActuatorClock::AsRecorded`](crate::flight_path::ActuatorClock)), because the diagnosis itself separates delays of the
+//! recorded deflections from physical effects.
 
 mod answer;
 mod error;

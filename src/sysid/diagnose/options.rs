@@ -1,23 +1,25 @@
-//! Options of a diagnosis.
+//! Options of a diagnosis, the search for effects that a model lacks. A candidate is an effect that the model may lack. An effect
+//! is asserted if the diagnosis states that the model lacks it.
 
 use crate::per_flight::PerFlight;
 
 /// Selection of the parts that the result of a diagnosis contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Detail {
-    /// The result with curves and placebo regressors (decoys).
+    /// The result has the candidates' curves and the placebo regressors (decoys, which check for false detections).
     Full,
-    /// The result without curves and placebo regressors. All other numbers are the same.
+    /// The result has no curves and placebo regressors. All other numbers are the same.
     Lean,
 }
 
 /// Options of a diagnosis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// Seed of all random draws: bootstraps, placebo regressors, and features of the flexible model.
+    /// Seed of all random draws: bootstraps, placebo regressors, and features of the flexible model that estimates what is left
+    /// unexplained.
     pub seed: u64,
-    /// Number of bootstrap draws under the null hypothesis that no effect is missing. They determine the critical
-    /// values.
+    /// Number of bootstrap draws under the null hypothesis that no effect is missing. They determine the critical values of the
+    /// evidence.
     pub nulls: usize,
     /// Number of block bootstraps that test how stably an effect is selected.
     pub bootstraps: usize,
@@ -29,9 +31,9 @@ pub struct Options {
     pub without: Vec<String>,
     /// Selection of the parts that the result contains.
     pub detail: Detail,
-    /// Whether the search for a formula enumerates expressions (free forms) if no shape of its library suffices.
+    /// Whether the search for a formula also enumerates expressions ("free forms") if no formula of its library suffices.
     pub free_forms: bool,
-    /// Constants estimated for each flight in addition to its sensor errors.
+    /// Constants that are estimated for each flight in addition to its sensor errors.
     pub per_flight: PerFlight,
 }
 

@@ -20,16 +20,16 @@ const KERNEL: f64 = 0.15;
 const BLOCK: usize = 14;
 /// Number of windows of the moving mean that is subtracted: about 0.5 s.
 const SLOW: usize = 7;
-/// Systematic error of the regression's delay, s: the largest error on 16 axes of noise-free flights of the X8 in calm
-/// air.
+/// Systematic error of the delay, s: the largest of 16 errors in noise-free flights of the X8 in calm air, each from roll alone
+/// or from pitch alone.
 const SYSTEMATIC: f64 = 2e-5;
 /// Additional standard deviation of the delay due to gusts, in s per m/s of the gusts' standard deviation.
 ///
 /// Gusts rotate the aircraft and the autopilot responds. The deflections are then correlated with moments that no regressor
-/// explains. On 20 flights of the X8 in light turbulence (2.4 m/s), the error was 2.2 ms RMS. The standard deviation without
-/// this addition was 1.1 ms.
+/// explains. In 20 flights of the X8 in light turbulence (2.4 m/s), the root mean square error of the delay was 2.2 ms. The
+/// standard deviation without this addition was 1.1 ms.
 const BY_GUSTS: f64 = 8e-4;
-/// Standard deviation of the linearly extrapolated bias correction, as a fraction of the correction.
+/// Standard deviation of the bias correction, which is a linear extrapolation, as a fraction of the correction.
 const CURVED: f64 = 0.5;
 /// Smallest number of windows per regressor for which a delay is estimated.
 const SUPPORT: usize = 10;
@@ -54,12 +54,12 @@ pub fn by_axis(segments: &[Segment], step: f64, sampling: Sampling) -> ByAxis {
     ]
 }
 
-/// Combines `own`, the delays from roll and pitch, with the prior into one delay. The 95 % interval of the prior is ±1.5
-/// samples. `step` is the sampling interval (s), `gusts` the standard deviation of the gusts (m/s).
+/// Combines `own`, the delays from roll and pitch, with the prior into one delay. The prior is zero, with a 95 % interval of
+/// ±1.5 samples. `step` is the sampling interval (s), `gusts` the standard deviation of the gusts (m/s).
 ///
-/// Errors in the regressors bias the coefficients. `erring` holds the delays estimated from copies of the flight. Each copy
-/// has additional errors of the same distribution as the errors of the flight. The change of the delay due to these errors
-/// is subtracted (simulation extrapolation, Cook and Stefanski 1994, linear).
+/// Errors in the regressors bias the coefficients and thus the delay. `erring` are the delays estimated from copies of the
+/// flight with additional errors of the same distribution as the errors of the flight. The mean change of the delay in the
+/// copies is subtracted (simulation extrapolation, Cook and Stefanski 1994, linear).
 pub fn estimate(own: ByAxis, erring: &[ByAxis], step: f64, gusts: f64) -> Skew {
     let prior = (SKEW_SAMPLES * step).powi(-2);
     let (mut information, mut weighted) = (prior, 0.0);
@@ -78,8 +78,8 @@ pub fn estimate(own: ByAxis, erring: &[ByAxis], step: f64, gusts: f64) -> Skew {
     Skew { late: weighted / information, deviation }
 }
 
-/// The delay corrected for the bias due to the states' errors. `again` holds the delays, s, estimated from the copies with
-/// additional errors.
+/// The delay `skew` without the bias that the errors of the states cause. `again` are the delays, s, estimated from the copies
+/// with additional errors.
 fn extrapolated(skew: Skew, again: &[f64]) -> Skew {
     if again.len() < 2 {
         return skew;
@@ -88,19 +88,19 @@ fn extrapolated(skew: Skew, again: &[f64]) -> Skew {
     let mean = again.iter().sum::<f64>() / count;
     let scatter = again.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0);
     let pulled = mean - skew.late;
-    // added variances: that of the mean over the copies, and that of the nonlinear part of the bias
+    // two variances are added: that of the mean over the copies, and that of the nonlinear part of the bias
     let deviation = (skew.deviation.powi(2) + scatter / count + (CURVED * pulled).powi(2)).sqrt();
     Skew { late: skew.late - pulled, deviation }
 }
 
-/// Regressors of the roll acceleration. The last one is that of the deflection.
+/// Regressors of the roll acceleration. The last one is proportional to the deflection.
 fn roll_terms(i: &Instant) -> [f64; 7] {
     let (s, v) = (&i.state, i.state.airspeed);
     let v2 = v * v;
     [v2, v2 * s.beta, v * s.p, v * s.r, s.p * s.q, s.q * s.r, v2 * i.controls.aileron]
 }
 
-/// Regressors of the pitch acceleration. The last one is that of the deflection.
+/// Regressors of the pitch acceleration. The last one is proportional to the deflection.
 fn pitch_terms(i: &Instant) -> [f64; 6] {
     let (s, v) = (&i.state, i.state.airspeed);
     let v2 = v * v;
@@ -141,7 +141,7 @@ fn from_axis<const T: usize>(
     regress(&rows, &values)
 }
 
-/// Mean regressors over the interval from sample `k` to the next sample.
+/// Regressors averaged over the interval from sample `k` to the next sample.
 fn held<const T: usize>(
     instants: &[Instant],
     k: usize,
@@ -158,7 +158,7 @@ fn held<const T: usize>(
     }
 }
 
-/// High-pass filter: each row less the moving mean of `SLOW` rows.
+/// High-pass filter: each row minus the moving mean over `SLOW` rows.
 fn fast(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let about = |i: usize| &rows[i.saturating_sub(SLOW / 2)..(i + SLOW / 2 + 1).min(rows.len())];
     let less_mean = |(i, row): (usize, &Vec<f64>)| {
@@ -169,8 +169,8 @@ fn fast(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     rows.iter().enumerate().map(less_mean).collect()
 }
 
-/// Kernel averages over the window from sample `start` on. Returns the regressors followed by the rate of the last
-/// regressor, and the angular acceleration.
+/// Kernel averages over the window that starts at sample `start`: the regressors followed by the rate of the last regressor,
+/// and the angular acceleration.
 fn window<const T: usize>(
     kernel: &[f64],
     terms: impl Fn(usize) -> [f64; T],

@@ -1,8 +1,9 @@
-//! Normal equations that are block-tridiagonal in time, bordered by constants.
+//! Solver for the normal equations of the flight-path smoother. They are block-tridiagonal in time (the unknowns of an instant
+//! are coupled with those of the next one) and bordered by constants such as sensor errors.
 //!
-//! The right-hand side is stored as the last column of the constants. Elimination replaces this column by the right-hand
-//! side of the constants' equations, and the last entry of the corner by the minimum of the sum of squares. A stretch is
-//! eliminated from both ends towards its middle in parallel, with the same number of operations as in sequence.
+//! The right-hand side is stored as the last column of the constants. Elimination of an instant replaces this column by the
+//! right-hand side of the constants' equations, and the last entry of the corner by the minimum of the sum of squares. A stretch
+//! of flight is eliminated from both ends towards its middle in parallel. The number of operations is the same as in sequence.
 
 /// Square block of one instant's unknowns.
 pub type Block<const N: usize> = [[f64; N]; N];
@@ -11,7 +12,7 @@ pub type Wide<const N: usize, const W: usize> = [[f64; W]; N];
 /// Matrix of the constants by the constants, with the right-hand side in the last row and column.
 pub type Corner<const W: usize> = [[f64; W]; W];
 
-/// Number of instants below which one thread eliminates both halves.
+/// Number of instants of a stretch below which a single thread eliminates both halves.
 const WORTH_A_THREAD: usize = 2000;
 
 /// Normal equations of one instant.
@@ -59,8 +60,8 @@ impl<const W: usize> Left<W> {
 
     /// Subtracts the contribution of an eliminated instant from the upper triangle; `mirror` completes the lower one.
     fn take<const N: usize>(&mut self, done: &Eliminated<N, W>) {
-        // The corner takes most of the computing time. It is symmetric, so the columns left of the row's own block of eight
-        // columns are skipped.
+        // The corner takes most of the computing time. It is symmetric, so for each row the columns to the left of its own block
+        // of eight columns are skipped.
         for (i, sums) in self.corner.iter_mut().enumerate() {
             let from = i / 8 * 8;
             for row in &done.rest {
@@ -82,15 +83,15 @@ impl<const W: usize> Left<W> {
         }
     }
 
-    /// Adds the contribution of another part of a stretch, or of another stretch.
+    /// Adds the equations of another part of a stretch, or of another stretch.
     pub fn add(&mut self, other: &Self) {
         add(&mut self.corner, &other.corner);
         self.log_det += other.log_det;
     }
 }
 
-/// An instant after elimination: `factorᵀ x = rest · (−p, 1) − next · x'`. Here x' are the unknowns of the neighbour nearer
-/// to the middle, and p are the constants.
+/// An instant after elimination: its unknowns x satisfy `factorᵀ x = rest · (−p, 1) − next · x'`. Here x' are the unknowns of
+/// the neighbour nearer to the middle, and p are the constants.
 #[derive(Clone, Copy, Debug)]
 struct Eliminated<const N: usize, const W: usize> {
     factor: Block<N>,
@@ -131,7 +132,7 @@ pub struct Stretch<const N: usize, const W: usize> {
 
 /// Equations of a stretch.
 pub trait Equations<const N: usize, const W: usize>: Sync {
-    /// Number of instants.
+    /// Number of instants of the stretch.
     fn count(&self) -> usize;
     /// Adds the equations of instant `k` to `node` and, if the constants are asked for, to their `corner`.
     fn instant(&self, k: usize, node: &mut Node<N, W>, corner: Option<&mut Corner<W>>);
@@ -139,7 +140,7 @@ pub trait Equations<const N: usize, const W: usize>: Sync {
     fn link(&self, k: usize, corner: Option<&mut Corner<W>>) -> Link<N, W>;
 }
 
-/// `into += xᵀ y`.
+/// Adds the product xᵀ y to `into`.
 pub fn add_gram<const R: usize, const A: usize, const B: usize>(
     into: &mut [[f64; B]; A],
     x: &[[f64; A]; R],
@@ -190,7 +191,7 @@ fn cholesky<const N: usize>(a: &Block<N>) -> Option<Block<N>> {
     Some(l)
 }
 
-/// Solves L y = `y` in place.
+/// Solves L x = `y` and replaces `y` by the solution x.
 fn forward<const N: usize, const W: usize>(l: &Block<N>, y: &mut Wide<N, W>) {
     for (i, by) in l.iter().enumerate() {
         let (done, rest) = y.split_at_mut(i);
@@ -230,8 +231,8 @@ enum Towards {
 }
 
 impl Towards {
-    /// Eliminates instant `k`. `pending` holds the contributions to `k` of the instant eliminated before; on return it
-    /// holds the contributions of `k` to the next one.
+    /// Eliminates instant `k`. On entry `pending` holds the contributions of the instant eliminated before to `k`; on return it
+    /// holds the contributions of `k` to the next instant. The equations of the constants are updated in `left`, if it is given.
     fn eliminate<const N: usize, const W: usize>(
         self,
         k: usize,
@@ -299,8 +300,8 @@ impl Towards {
         Some((side, pending, left))
     }
 
-    /// The unknowns of a side of `length` instants, in order from the middle outwards. `middle` holds the unknowns of the
-    /// middle instant, `by` the negated constants followed by one.
+    /// Computes the unknowns of a side of `length` instants, in order from the middle outwards. `middle` holds the unknowns of
+    /// the middle instant, `by` the negated constants followed by one.
     fn solve<const N: usize, const W: usize>(
         self,
         side: &Side<N, W>,
@@ -369,8 +370,8 @@ impl<const N: usize, const W: usize> Eliminated<N, W> {
 }
 
 impl<const N: usize, const W: usize> Stretch<N, W> {
-    /// The unknowns in order of time. `by` holds the negated constants, followed by one. `None` if a repeated elimination
-    /// fails, or if the elimination kept only the constants.
+    /// Computes the unknowns of all instants, in order of time. `by` holds the negated constants, followed by one. `None` if a
+    /// repeated elimination fails, or if the elimination kept only the constants.
     pub fn substitute(
         &self,
         equations: &impl Equations<N, W>,

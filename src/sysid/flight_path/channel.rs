@@ -1,12 +1,12 @@
-//! A channel of a log: finite samples in time order, with interpolation.
+//! One channel (column) of a log: its finite samples in time order, and their interpolation.
 
 use std::ops::{Add, Mul, Sub};
 
 use greylag_num::statistics::quantile;
 
-/// Fraction of repeated values above which a channel's sensor is assumed to be slower than the log's rows.
+/// Fraction of repeated values above which the sensor is assumed to be slower than the rows of the log.
 const HELD_SHARE: f64 = 0.3;
-/// Number of periods of the slower sensor after which a repeated value counts as a new measurement.
+/// Number of periods of a slow sensor after which a repeated value counts as a new measurement.
 const LONGEST_PERIODS: f64 = 2.5;
 
 /// Kind of a channel's values. It determines the interpolation and the treatment of repeated values.
@@ -30,11 +30,11 @@ pub struct Channel {
 }
 
 impl Channel {
-    /// The finite samples among `samples` (time in s, value). Angles are unwrapped.
+    /// A channel with the finite values among `samples` (time in s, value). Angles are unwrapped.
     ///
-    /// If many values repeat the previous value, the sensor is slower than the log's rows. Repeated values are then dropped. If
-    /// a value, for example a coarsely quantised one, persists for several periods of the sensor, some of its repeats are kept.
-    /// The last sample is always kept.
+    /// If many values repeat the previous value, the sensor is slower than the rows of the log, and repeated values are dropped.
+    /// If a value persists for several periods of the sensor, for example because of coarse quantisation, some of its repetitions
+    /// are kept. The last sample is always kept.
     pub fn new(samples: impl Iterator<Item = (f64, f64)>, kind: Interpolation) -> Channel {
         let (mut time, mut value): (Vec<f64>, Vec<f64>) =
             samples.filter(|(_, x)| x.is_finite()).unzip();
@@ -69,14 +69,15 @@ impl Channel {
         if periods.is_empty() { 0.0 } else { quantile(&periods, 0.5) }
     }
 
-    /// Number of samples from `start` to `end`, s.
+    /// Number of samples in the time from `start` to `end`, s.
     pub fn count(&self, start: f64, end: f64) -> usize {
         let (a, b) =
             (self.time.partition_point(|t| *t < start), self.time.partition_point(|t| *t <= end));
         b.saturating_sub(a)
     }
 
-    /// Linear interpolation at `t` (s) between samples at most `reach` (s) apart; NaN if there are none.
+    /// The value at `t` (s) by linear interpolation between the samples before and after it. NaN if these are more than `reach`
+    /// (s) apart.
     pub fn between(&self, t: f64, reach: f64) -> f64 {
         match self.around(t) {
             [_, Some((time, x))] if time == t => x,
@@ -87,10 +88,9 @@ impl Channel {
         }
     }
 
-    /// The measurement at `t` (s); NaN without a sample within `near` (s).
+    /// The measured value at `t` (s); NaN if no sample lies within `near` (s) of it.
     ///
-    /// The value is interpolated by [`between`](Self::between). If the interpolation is NaN, the value is the nearest
-    /// sample.
+    /// The value is interpolated by [`between`](Self::between). If the result is NaN, the nearest sample is returned instead.
     pub fn measured(&self, t: f64, reach: f64, near: f64) -> f64 {
         let [left, right] = self.around(t);
         let distance = |s: &(f64, f64)| (s.0 - t).abs();
@@ -118,8 +118,8 @@ impl Channel {
     }
 }
 
-/// For each sample, whether it is kept when repeated values are dropped. `fresh` marks values that differ from the previous
-/// one.
+/// For each sample, whether it is kept when repeated values are dropped. `fresh` states for each sample whether its value differs
+/// from the previous one.
 fn kept(time: &[f64], fresh: &[bool]) -> Vec<bool> {
     let new: Vec<f64> = time.iter().zip(fresh).filter(|(_, f)| **f).map(|(t, _)| *t).collect();
     let periods: Vec<f64> = new.windows(2).map(|w| w[1] - w[0]).collect();
@@ -142,7 +142,7 @@ fn unwrap(angles: &mut [f64]) {
     }
 }
 
-/// The angle wrapped to −π to π, rad.
+/// Wraps `angle` to the range from −π to π, rad.
 pub fn wrap(angle: f64) -> f64 {
     use std::f64::consts::TAU;
     angle - TAU * (angle / TAU).round()
@@ -150,11 +150,11 @@ pub fn wrap(angle: f64) -> f64 {
 
 /// Value and slope (per sample) of the cubic interpolation between the second and third of four samples.
 ///
-/// `part`, 0 to 1, is the fraction of the interval. At the second and third sample, the cubic has the slope of the parabola
+/// `part` (0 to 1) is the position in this interval. At the second and the third sample, the cubic has the slope of the parabola
 /// through that sample and its two neighbours.
 ///
-/// Value and slope are continuous from one interval to the next. A parabola through the nearest sample would be
-/// discontinuous half-way between two samples. With noisy samples, this jump would stop the search for a delay.
+/// Value and slope are therefore continuous from one interval to the next. A parabola through the nearest sample and its
+/// neighbours would jump half-way between two samples. With noisy samples, such jumps would stop the search for a delay.
 pub fn cubic<T>([a, b, c, d]: [T; 4], part: f64) -> (T, T)
 where
     T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>,
@@ -199,7 +199,7 @@ mod tests {
         let ((value, slope), (next, onward)) = (cubic(four(0), 1.0), cubic(four(1), 0.0));
         assert!((value - 2.0).abs() < 1e-12 && (next - 2.0).abs() < 1e-12);
         assert!((slope - onward).abs() < 1e-12);
-        // the slope is that of the value
+        // the returned slope is the derivative of the returned value
         let by = 1e-6;
         let rise = cubic(four(0), 0.3 + by).0 - cubic(four(0), 0.3 - by).0;
         assert!((rise / (2.0 * by) - cubic(four(0), 0.3).1).abs() < 1e-6);

@@ -1,5 +1,6 @@
-//! Normal equations of a fit: linearises all stretches at the present estimate, eliminates the paths, and solves for the
-//! constants.
+//! Normal equations of the flight-path reconstruction. The unknowns are the path (motion and gusts at every instant) and the
+//! constants of the flight (sensor errors, mean wind). A stretch is a part of the log without gaps. The equations of all
+//! stretches are linearised at the present estimate, the paths are eliminated, and the constants are solved for.
 
 mod along;
 mod erring;
@@ -20,21 +21,21 @@ use crate::flight_path::{Options, ReconstructError, noise};
 use greylag_logs::Sampling;
 use greylag_num::statistics;
 
-/// Number of columns if the constants are free: one for each constant, and the right-hand side.
+/// Number of columns if the constants are estimated: one for each constant, and one for the right-hand side.
 const WIDTH: usize = COUNT + 1;
 const BETWEEN: usize = COUNT - INERTIAL + 1;
 
 /// The present estimate of paths, constants and noise.
 #[derive(Clone, Debug)]
 pub struct Found {
-    /// Path of each track.
+    /// Path of each track, the resampled data of a stretch.
     pub paths: Vec<Path>,
-    /// Values of the constants.
+    /// Estimates of the constants.
     pub values: Values,
     /// Standard deviations of the constants.
     pub deviations: Values,
-    /// Prior standard deviations of the constants. They are larger for constants that were freed because the data show them
-    /// significantly.
+    /// Prior standard deviations of the constants. They were enlarged for constants that the data show to differ significantly
+    /// from their prior means.
     pub widths: Values,
     /// Noise levels of the sensors.
     pub levels: Levels,
@@ -43,7 +44,7 @@ pub struct Found {
 /// Data and priors of a fit.
 #[derive(Clone, Copy)]
 pub struct Problem<'a> {
-    /// The log on uniform clocks.
+    /// The log, resampled to uniform time steps.
     pub log: &'a Log,
     /// Settings of the reconstruction.
     pub options: &'a Options,
@@ -57,19 +58,19 @@ pub struct Problem<'a> {
 
 /// Solution of one linearisation with `N` unknowns for each instant.
 pub struct Solved<const N: usize> {
-    /// Changes of the path at every instant of every stretch.
+    /// Changes of the `N` unknowns of the path, for every stretch and instant.
     moves: Vec<Vec<[f64; N]>>,
-    /// Changes of the constants; zero where they are held.
+    /// Changes of the constants; zero if they are held.
     constants: Values,
-    /// Standard deviations of the constants; zero where they are held.
+    /// Standard deviations of the constants; zero if they are held.
     pub deviations: Values,
-    /// Measurements less their predictions, before the change.
+    /// Residuals (measured − predicted values) before the change, for every stretch.
     pub readings: Vec<Vec<Reading>>,
 }
 
 impl Problem<'_> {
-    /// Solves for the path's motion and the constants, with the gusts held. As in the other methods, residuals beyond
-    /// `bound` standard deviations are down-weighted.
+    /// Solves for the motion and the constants, with the gusts held. Here and in the methods below, residuals beyond `bound`
+    /// standard deviations have less weight (Huber).
     pub fn calm(&self, found: &Found, bound: f64) -> Option<Solved<MOTION>> {
         self.solve::<MOTION, WIDTH, AT, BETWEEN>(found, bound)
     }
@@ -79,8 +80,8 @@ impl Problem<'_> {
         self.solve::<MOTION_AND_GUST, 1, 1, 1>(found, bound)
     }
 
-    /// The merit function of the line search: −2 ln L of the path and the constants at fixed noise levels, up to a
-    /// constant.
+    /// The function that the line search minimises: −2 ln L of the path and the constants, where L is the likelihood with the
+    /// prior. The noise levels are fixed, and terms that depend only on them are left out.
     pub fn merit(&self, found: &Found, bound: f64) -> f64 {
         let before = |i: usize| ((found.values[i] - self.means[i]) / self.widths[i]).powi(2);
         let pairs = self.log.tracks.par_iter().zip(&found.paths);
@@ -108,10 +109,9 @@ impl Problem<'_> {
         measured + between.sum::<f64>()
     }
 
-    /// Robust scale of the residuals of the kinematic steps, for each axis of rotation and velocity.
-    ///
-    /// The scales are relative to the assumed standard deviations of gyros and accelerometers. They are at most about 1 if
-    /// the assumed noise is large enough.
+    /// Robust standard deviations of the residuals of the kinematic steps, for each axis of rotation and velocity. They are
+    /// ratios to the standard deviations that the assumed noise of gyros and accelerometers gives. If that noise is large
+    /// enough, they are at most about 1.
     pub fn step_residuals(&self, found: &Found) -> [f64; MOTION] {
         let (step, gravity) = (self.log.step, self.options.gravity);
         let sd = step_deviations::<MOTION>(&found.levels, step);
@@ -126,8 +126,8 @@ impl Problem<'_> {
         left.map(|mut left| noise::level(&mut left))
     }
 
-    /// Differences between measured and estimated roll, pitch and yaw are averaged over blocks of `block` (s). Returns the
-    /// root mean square of these means, rad; 0 for an angle that is not measured.
+    /// Slow differences between measured and estimated roll, pitch and yaw, rad. The differences are averaged over blocks of
+    /// `block` (s), and the root mean square of these means is returned. It is 0 for an angle that is not measured.
     pub fn slow_disagreement(&self, found: &Found, block: f64) -> [f64; 3] {
         let vanes_at = self.log.sensors.vanes_at();
         let mut sums = [(0.0, 0.0); 3];
@@ -148,7 +148,8 @@ impl Problem<'_> {
         sums.map(|(sum, count): (f64, f64)| (sum / count.max(1.0)).sqrt())
     }
 
-    /// −2 ln L of the noise levels with the constants held. Terms that do not depend on the gusts' level are left out.
+    /// −2 ln L of the noise levels, where L is the likelihood with the constants held. Terms that do not depend on the level of
+    /// the gusts are left out. `None` if the equations have no solution.
     pub fn misfit(&self, found: &Found, bound: f64) -> Option<f64> {
         let left = self.constants::<MOTION_AND_GUST, 1, 1, 1>(found, bound, None)?;
         let components = 3.0 * found.paths.iter().map(Path::len).sum::<usize>() as f64;
@@ -156,8 +157,8 @@ impl Problem<'_> {
         Some(misfit + 2.0 * components * found.levels.gusts.ln())
     }
 
-    /// Information matrix of the constants, from prior and data. A constant that the log's columns do not observe has only the
-    /// information of its prior.
+    /// Information matrix of the constants, from prior and data. For a constant that no column of the log can show, it has only
+    /// the information of the prior.
     fn information<const W: usize>(&self, left: &Left<W>) -> Option<SMatrix<f64, COUNT, COUNT>> {
         let first = W.checked_sub(WIDTH)?;
         Some(SMatrix::from_fn(|i, j| {
@@ -220,7 +221,7 @@ impl Problem<'_> {
         Some(Solved { moves, constants, deviations, readings })
     }
 
-    /// Equations of the constants alone.
+    /// Equations of the constants alone, after the elimination of the paths.
     fn constants<const N: usize, const W: usize, const M: usize, const D: usize>(
         &self,
         found: &Found,
@@ -255,7 +256,7 @@ impl Problem<'_> {
     }
 }
 
-/// Number of instants of a flight above which the back substitution computes equations again instead of storing them.
+/// If a flight has more instants than this, the back substitution recomputes equations instead of storing them.
 const HELD: usize = 100_000;
 
 /// Huber's loss of a residual in standard deviations: quadratic up to `bound`, then linear.
@@ -264,11 +265,11 @@ fn huber(size: f64, bound: f64) -> f64 {
 }
 
 impl<const N: usize> Solved<N> {
-    /// Changes the paths and the constants in `found` by the fraction `part` of the step. Returns the largest change of a
-    /// constant, in standard deviations.
+    /// Changes the paths and the constants in `found` by the fraction `part` of the computed changes. Returns the largest change
+    /// of a constant, in standard deviations.
     ///
     /// # Errors
-    /// The change of a constant is not finite; the error names `flight`.
+    /// If the change of a constant is not finite. The error names `flight`.
     pub fn apply(
         &self,
         found: &mut Found,
@@ -300,7 +301,7 @@ impl<const N: usize> Solved<N> {
     }
 }
 
-/// The error of a reconstruction without a finite path; `why` is the reason in words.
+/// The error of a reconstruction that has no finite path. `why` is the reason in words.
 pub fn no_path(flight: &str, why: &'static str) -> ReconstructError {
     ReconstructError::NoPath { flight: flight.into(), why }
 }

@@ -1,8 +1,9 @@
-//! Uncertainty of the constants due to gusts, by simulation.
+//! Uncertainty of the estimated constants (sensor errors and mean wind) due to gusts, by simulation.
 //!
-//! The fit of the constants assumes white noise of the air-data sensors with a variance that includes the gusts. But gusts
-//! are correlated over many seconds. White noise therefore understates the error of the mean wind and overstates that of a
-//! delay. Here, random gusts of the estimated level are inserted into the equations of the fit.
+//! The fit of the constants assumes white noise of the air-data sensors, with a variance that includes the gusts. But gusts are
+//! correlated over many seconds. The fit therefore understates the error of the mean wind and overstates that of a delay. Here,
+//! random gusts of the estimated level are inserted into the equations of the fit, and the resulting changes of the constants
+//! are evaluated.
 
 use nalgebra::{Matrix3, Vector3};
 use rand_distr::{Distribution, StandardNormal};
@@ -14,14 +15,15 @@ use crate::flight_path::nuisance::{COUNT, Values};
 use crate::flight_path::path::Path;
 use greylag_num::stream::{Stream, stream};
 
-/// Number of pairs of random draws for which one set of equations is solved. A pair is a draw without gusts and a draw with
+/// Number of pairs of random draws for which one set of equations is solved. A pair has one draw without gusts and one with
 /// gusts.
 const PAIRS: usize = OTHERS / 2;
-/// Number of sets of equations. Their 32 pairs determine a standard deviation to one eighth of its value.
+/// Number of sets of equations. With their 32 pairs, the relative error of a standard deviation is one eighth.
 const SETS: u64 = 4;
 
-/// Standard deviations of the constants in `found`, a fit that assumes no gusts, for data with the noise levels of `rough`.
-/// The noise of `rough` consists of gusts and of white noise of the air-data sensors.
+/// Standard deviations of the constants in `found`, which is a fit that assumes no gusts. The data have the noise levels of
+/// `rough`: gusts, and white noise of the air-data sensors. Residuals beyond `bound` standard deviations are down-weighted, as
+/// in the fit. `None` if the equations are singular.
 pub fn deviations(problem: &Problem, found: &Found, rough: &Found, bound: f64) -> Option<Values> {
     let (mut assumed, mut drawn) = ([0.0; COUNT], [0.0; COUNT]);
     for set in 0..SETS {
@@ -46,8 +48,8 @@ pub fn deviations(problem: &Problem, found: &Found, rough: &Found, bound: f64) -
     }))
 }
 
-/// Random residuals of airspeed, α and β along a path. The first half of the draws has the noise that the fit assumes. The
-/// second half has white noise and gusts, from the same random numbers.
+/// Random residuals of airspeed, α and β along a path, for all draws. The first half of the draws has the white noise that the
+/// fit assumes. The second half has white noise and gusts, with the same random numbers for the white noise.
 fn draws(
     problem: &Problem,
     path: &Path,

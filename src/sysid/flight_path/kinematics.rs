@@ -1,4 +1,4 @@
-//! Kinematic propagation of the path from one sample to the next by gyros and accelerometers.
+//! Propagates the path (attitude, velocity and gust) from one sample to the next with gyros and accelerometers.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -21,7 +21,7 @@ pub fn gust_kept(step: f64) -> f64 {
     (-step / GUST_TIME).exp()
 }
 
-/// Mean rates and specific forces over each interval between samples, from gyros and accelerometers.
+/// Mean body rates and specific forces over each interval between samples, from gyros and accelerometers.
 #[derive(Clone, Debug)]
 pub struct Drive {
     /// Mean rate from each sample to the next, body axes, rad/s.
@@ -41,7 +41,7 @@ pub const MOTION: usize = 6;
 /// Number of unknowns of an instant: attitude, velocity and the three components of the gust.
 pub const MOTION_AND_GUST: usize = 9;
 
-/// Difference between the state at the next sample and the state propagated from one sample, with its derivatives.
+/// Difference between the state at the second of two samples and the state propagated from the first, with its derivatives.
 ///
 /// The rows are attitude (rad), velocity (m/s, body axes) and gust (m/s, earth axes).
 pub struct Step<const N: usize, const D: usize> {
@@ -68,10 +68,10 @@ fn put<const N: usize, const W: usize>(
 }
 
 impl Drive {
-    /// Rates and forces of `track`, corrected with the constants `values`, for the sampling interval `step` (s) and `gravity`
-    /// (m/s²).
+    /// Rates and forces of `track`, corrected for the sensor errors in `values`, for the sampling interval `step` (s) and
+    /// `gravity` (m/s²).
     ///
-    /// Without accelerometers, the force is the one that keeps the velocity constant.
+    /// Without accelerometers, the specific force is assumed to keep the velocity constant.
     pub fn new(
         track: &Track,
         values: &Values,
@@ -113,9 +113,9 @@ impl Drive {
         drive
     }
 
-    /// Equations of the step from sample `k` to the next sample along `path`.
+    /// The step from sample `k` to the next sample, linearised at `path`.
     ///
-    /// The gust decays with the time constant [`GUST_TIME`]. With `D` = 1 the constants are held.
+    /// The gust decays with the time constant [`GUST_TIME`]. With `D` = 1 there are no derivatives with respect to constants.
     pub fn step<const N: usize, const D: usize>(
         &self,
         path: &Path,
@@ -181,8 +181,8 @@ fn weight(track: &Track, k: usize, gravity: f64) -> Vector3<f64> {
     r.transpose() * Vector3::new(0.0, 0.0, -gravity)
 }
 
-/// `samples` with a delay of `late` sampling intervals removed, and their derivatives with respect to the delay, per
-/// sampling interval. The interpolation is cubic through four samples.
+/// Removes a delay of `late` sampling intervals from `samples`. Returns the shifted samples, and their derivatives with respect
+/// to the delay, per sampling interval. The interpolation is cubic, from four samples.
 pub fn shifted(samples: &[[f64; 3]], late: f64) -> (Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
     let last = samples.len() as isize - 1;
     let at = |i: isize| Vector3::from(samples[i.clamp(0, last) as usize]);

@@ -1,4 +1,8 @@
-//! Noise levels of the sensors. They are estimated first from the measurements alone, then from the residuals of the fit.
+//! Noise levels (standard deviations) of the sensors. They are estimated first from the measurements alone, then from the
+//! residuals of the fit.
+//!
+//! The fit reconstructs the path: attitude, velocity and flow angles over time. A kinematic step predicts the path from one
+//! sample to the next with gyros and accelerometers. The colour of a channel is the ratio of its slow noise to white noise.
 
 use crate::flight_path::intake::{Log, Track};
 use crate::flight_path::measurement::{self, Reading};
@@ -6,27 +10,26 @@ use crate::flight_path::noise;
 use crate::flight_path::path::CHANNELS;
 use greylag_physics::sensors::Noisy;
 
-/// Smallest noise levels of gyros (rad/s) and accelerometers (m/s²). They are about as large as the errors of the discrete
-/// kinematics.
+/// Smallest noise levels of gyros (rad/s) and accelerometers (m/s²), about as large as the errors of the discrete kinematic
+/// steps.
 const GYRO_FLOOR: f64 = 2e-4;
 const FORCE_FLOOR: f64 = 5e-3;
 /// Smallest noise levels of the measured channels: attitude (rad), airspeed (m/s), vanes (rad), velocity (m/s).
 const FLOORS: [f64; CHANNELS] = [2e-5, 2e-5, 2e-5, 1e-3, 5e-5, 5e-5, 1e-3, 1e-3, 1e-3];
-/// Smallest noise level of a channel, divided by the change of the path between two samples due to the noise of gyros or
-/// accelerometers.
+/// Smallest ratio of a channel's noise level to the change of the path in one kinematic step that the noise of gyros or
+/// accelerometers causes.
 ///
-/// With a smaller level the path would follow every single measurement. The most likely delay would then be half a sample
-/// for any true delay, because interpolation at half a sample averages two measurements.
+/// With a smaller ratio the path would follow every single measurement. The most likely delay of a sensor would then be half a
+/// sample for any true delay, because interpolation at half a sample averages two measurements.
 const CARRIED: f64 = 30.0;
 /// Noise levels used if there are too few samples for an estimate: attitude (rad), airspeed (m/s), vanes (rad), velocity
 /// (m/s).
 const DEFAULTS: [f64; CHANNELS] = [0.02, 0.02, 0.05, 0.5, 0.02, 0.02, 0.5, 0.5, 0.5];
-/// Largest products of noise level and `colour`: the largest plausible errors of attitude (rad), airspeed (m/s), vanes
-/// (rad) and velocity (m/s). Without this limit, a path that departs from a sensor would reduce the sensor's weight and
-/// depart further.
+/// Largest products of noise level and colour: the largest plausible errors of attitude (rad), airspeed (m/s), vanes (rad) and
+/// velocity (m/s). Without this limit, a path that departs from a sensor would reduce the sensor's weight and depart further.
 const WIDEST: [f64; CHANNELS] = [0.05, 0.05, 0.1, 2.0, 0.1, 0.1, 1.0, 1.0, 1.0];
-/// Noise levels of gyros or accelerometers are raised if the scaled residual of the kinematic steps exceeds this. At a
-/// launch, the scaled residual is 8.
+/// Noise levels of gyros or accelerometers are raised if the residual of the kinematic steps exceeds this number of standard
+/// deviations. At a launch, it reaches 8.
 const EXCESSIVE: f64 = 2.0;
 /// Standard deviation of the specific force if the log has no accelerometers, m/s².
 const UNKNOWN_FORCE: f64 = 3.0;
@@ -54,12 +57,13 @@ pub struct Levels {
     pub gusts: f64,
     /// Noise of the measured channels, in their units.
     pub measured: [f64; CHANNELS],
-    /// Smallest levels of the channels: the white part of the measurements, if the sampling rate is high enough to estimate
-    /// it. Without this limit, residuals of a path that follows the measurements closely would seem smaller than the noise.
+    /// Smallest levels of the channels: the white part of the measurements, if more than half of the samples have a
+    /// measurement. Without this limit, residuals of a path that follows the measurements closely would seem smaller than the
+    /// noise.
     pub white: [f64; CHANNELS],
-    /// Ratio of the standard deviation of the channels' block means to that of white noise, at least 1.
+    /// Colour of the channels, at least 1: standard deviation of block means of the residuals, divided by that of white noise.
     pub colour: [f64; CHANNELS],
-    /// Whether a level is stated and therefore not estimated.
+    /// Whether the log's sensor description states the level, which is then not estimated.
     pub stated: [bool; CHANNELS],
     /// Standard deviation of white airspeed noise whose time averages vary as much as the slow error of the sensor, m/s.
     /// Zero if a vane measures α or the log has no velocity over ground.
@@ -70,14 +74,14 @@ pub struct Levels {
 }
 
 impl Levels {
-    /// Levels before the fit: the white part of every channel.
+    /// Levels before the fit: the white part of every channel's measurements.
     pub fn first(log: &Log) -> Levels {
         let over = |get: &dyn Fn(&Track, usize) -> f64| {
             noise::white(log.tracks.iter().flat_map(|t| (0..t.len()).map(move |k| get(t, k))))
         };
         let or = |level: f64, default: f64| if level.is_finite() { level } else { default };
         let attitude = |i: usize| {
-            // angles jump at ±π, their sine and cosine do not
+            // angles jump at ±π, but their sine and cosine do not
             let (a, b) =
                 (over(&|t, k| t.attitude[k][i].sin()), over(&|t, k| t.attitude[k][i].cos()));
             a.hypot(b)
@@ -101,7 +105,7 @@ impl Levels {
         let speeds = log.tracks.iter().flat_map(|t| &t.airspeed).filter(|v| v.is_finite());
         let (sum, count) = speeds.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
         let between = |sd: [f64; 3]| CARRIED * log.step * sd.into_iter().fold(0.0, f64::max);
-        // the unknown force in a log without accelerometers is not noise, because its mean is not zero
+        // the unknown force in a log without accelerometers is not noise, because its mean differs from zero
         let gain = if log.has.force { between(force) } else { 0.0 };
         let turn = between(gyro);
         let floor: [f64; CHANNELS] = std::array::from_fn(|i| {
@@ -126,7 +130,7 @@ impl Levels {
         .as_stated(log)
     }
 
-    /// These levels with the stated noise of the log's sensors in place of the estimates.
+    /// These levels, with the stated noise of the log's sensors instead of the estimates.
     fn as_stated(mut self, log: &Log) -> Levels {
         let kinds = [(Noisy::Attitude, 0..3), (Noisy::Airspeed, 3..4), (Noisy::Vanes, 4..6)];
         for (kind, channels) in kinds.into_iter().chain([(Noisy::Velocity, 6..9)]) {
@@ -139,8 +143,8 @@ impl Levels {
         self
     }
 
-    /// Raises the noise levels of gyros or accelerometers if their scaled kinematic residuals exceed `EXCESSIVE`. The three
-    /// axes have a common factor. Returns the natural logarithm of the largest factor.
+    /// Raises the noise levels of gyros or accelerometers if their kinematic residuals (in standard deviations) exceed
+    /// `EXCESSIVE`. The three axes have a common factor. Returns the natural logarithm of the largest factor.
     pub fn loosen(&mut self, step_residuals: &[f64; 6]) -> f64 {
         let worst = |of: &[f64]| {
             let worst = of.iter().copied().fold(1.0, f64::max);
@@ -152,14 +156,14 @@ impl Levels {
         turn.max(pull).ln()
     }
 
-    /// Smallest colour of a channel due to slow errors, if a sample has the noise `level`.
+    /// Smallest colour of a channel that slow errors cause if a sample has the noise `level`.
     fn least_colour(&self, channel: usize, level: f64) -> f64 {
         let least = if channel == AIRSPEED { self.slow_airspeed } else { 0.0 };
         1.0_f64.hypot(least / level)
     }
 
-    /// Estimates the levels again from the residuals in `readings`, for the sampling interval `step` (s). Returns the
-    /// largest change of the natural logarithm of a level.
+    /// Estimates the levels again from the residuals in `readings`. `step` is the sampling interval, s. Returns the largest
+    /// |natural logarithm| of the ratio of a new to an old level.
     pub fn renew(&mut self, readings: &[Vec<Reading>], step: f64) -> f64 {
         let mut change = 0.0_f64;
         for (channel, widest) in WIDEST.into_iter().enumerate() {
@@ -172,7 +176,7 @@ impl Levels {
                 continue;
             }
             if self.stated[channel] {
-                // the stated noise is that of one sample and does not include the errors' correlation in time
+                // the stated noise is that of one sample and does not include the correlation of errors over time
                 self.colour[channel] = self.least_colour(channel, self.measured[channel]);
                 continue;
             }
@@ -185,7 +189,7 @@ impl Levels {
     }
 }
 
-/// White noise, m/s, that represents [`PITOT`] at `airspeed` (m/s): see [`Levels::slow_airspeed`].
+/// White noise, m/s, that represents the slow error [`PITOT`] at `airspeed` (m/s): see [`Levels::slow_airspeed`].
 fn slow_airspeed(log: &Log, airspeed: f64) -> f64 {
     if log.has.alpha || !log.has.velocity {
         return 0.0;

@@ -1,10 +1,10 @@
-//! Lever arms: corrections for the rotation of sensors about the centre of gravity.
+//! Lever arms: corrections for sensors that are not at the centre of gravity and therefore move when the aircraft rotates.
 
 use nalgebra::Vector3;
 
 use crate::flight_path::intake::Track;
 
-/// Half of the interval over which gyro rates are differenced to angular acceleration, s.
+/// Half of the interval over which gyro rates are differenced to compute the angular acceleration, s.
 const HALF_S: f64 = 0.02;
 
 /// Transfers the specific force of `track` from the accelerometer's position `at` (m from the centre of gravity, body axes)

@@ -1,15 +1,15 @@
-//! Catalogue entries of measurement errors that resemble missing physical effects.
+//! Catalogue entries for measurement errors, and for wind, that may look like an effect that a model lacks.
 //!
-//! The reconstruction of the flight path estimates these errors without aerodynamics. Their coefficients are the
-//! [nuisances](crate::flight_path) of the reconstruction, with the same names.
+//! The flight-path reconstruction estimates these errors from kinematics alone, without aerodynamics. The coefficients of the
+//! entries are the [constants](crate::flight_path) that it estimates, with the same names.
 
 use greylag_physics::effects::{Coefficient, Description, Entry, coefficient};
 
-/// Source of the formulas of sensor errors that act on the path.
+/// Source of the formulas that follow from kinematics.
 const PATH: &str = "kinematics of a rigid body, which hold no aerodynamics; Klein and Morelli, Aircraft System \
                     Identification, section 10.2";
 
-/// All measurement effects.
+/// Descriptions of all measurement effects.
 pub const MEASUREMENT_EFFECTS: [Description; 10] = [
     Description {
         id: "steady_wind",
@@ -199,7 +199,7 @@ const SKEW: [Coefficient; 5] = [
     coefficient("skew_velocity", "delay of the velocity over ground", "s", (-2.0, 2.0)),
 ];
 
-/// Common properties of all measurement effects: no shape constants, no table.
+/// A description with the catalogue entry `entry` and without nonlinear coefficients or tables. The other fields are empty.
 const fn measured(entry: &Entry) -> Description {
     Description {
         id: "",

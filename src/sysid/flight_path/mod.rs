@@ -1,7 +1,6 @@
-//! Flight-path reconstruction (data compatibility check): estimates states without sensor errors from a log.
+//! Flight-path reconstruction (data compatibility check): estimates states, sensor errors and wind of a logged flight.
 //!
-//! The kinematic equations contain no aerodynamics. Sensor errors and wind are therefore estimated before any model of the
-//! aircraft is used.
+//! It uses only kinematic equations, which contain no aerodynamics. No aerodynamic model of the aircraft is therefore needed.
 
 pub mod measurement_effects;
 pub mod reconstruction;
@@ -40,14 +39,14 @@ use greylag_model::GreyBox;
 use greylag_physics::Sensors;
 use greylag_physics::airframe::ActuatorFigures;
 
-/// Clock of the reconstructed deflections.
+/// Time base of the reconstructed deflections.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ActuatorClock {
-    /// The gyros' clock: recorded deflections are shifted if their delay is significant. The estimated delay also contains
-    /// any time delay or lag of the surfaces that the record does not show. The shift removes both.
+    /// The time base of the gyros: the recorded deflections are shifted by their delay if it is significant. The estimated
+    /// delay also contains any delay or lag of the surfaces that the record does not show. The shift removes both.
     Estimated,
-    /// The log's clock: deflections stay as recorded. A later search for missing effects can then separate clock errors from
-    /// physics. `skew_actuators` is estimated for information only.
+    /// The time base of the log: deflections stay as recorded. A later search for missing effects can then separate errors of
+    /// the time base from physical delays. The delay `skew_actuators` is estimated for information only.
     AsRecorded,
 }
 
@@ -58,15 +57,15 @@ pub struct Options {
     pub name: String,
     /// Actuator model of the airframe. It converts commands to deflections if the log has no deflections.
     pub actuators: ActuatorFigures,
-    /// Effective gravity at the site, m/s².
+    /// Gravity at the site, m/s².
     pub gravity: f64,
-    /// Meaning of a sample of the body rates: the value at an instant, or a value held until the next sample. `None` to
-    /// read the meaning from the log's column `rate_hold_s`, or to infer it from the data. Clock skews are relative to the
-    /// gyro samples under this meaning.
+    /// Meaning of a sample of the body rates: the value at an instant, or a value held until the next sample. If it is `None`,
+    /// the log's column `rate_hold_s` states it, or it is inferred from the data. Delays of other sensors are relative to
+    /// the body rates in this meaning.
     pub sampling: Option<Sampling>,
-    /// Clock of the reconstructed deflections.
+    /// Time base of the reconstructed deflections.
     pub actuators_clock: ActuatorClock,
-    /// Shortest time between reconstructed samples, s. A log with a longer median period keeps that period.
+    /// Time between reconstructed samples, s. If the log has a longer median sample period, that period is used.
     pub step_s: f64,
     /// Longest time between rows that does not count as a gap, s.
     pub gap_s: f64,
@@ -74,7 +73,7 @@ pub struct Options {
     pub shortest_s: f64,
     /// Airspeed below which the aircraft counts as not flying, m/s.
     pub airspeed_min_mps: f64,
-    /// Stated properties of the aircraft's sensors. Properties that the log states take precedence.
+    /// Properties of the aircraft's sensors from its airframe file. Properties that the log states take precedence.
     pub sensors: Sensors,
 }
 
@@ -95,7 +94,7 @@ impl Options {
         }
     }
 
-    /// Options for the aircraft and the gravity of `model`, with deflections on `clock`.
+    /// Options for the aircraft and the gravity of `model`. `clock` is the time base of the deflections.
     ///
     /// For a slow aircraft, the airspeed limit and the shortest segment are smaller than the defaults.
     pub fn of(name: &str, model: &GreyBox, clock: ActuatorClock) -> Options {
@@ -111,7 +110,7 @@ impl Options {
         }
     }
 
-    /// These options with the shortest segment reduced to `shortest_s` (s) if it is longer.
+    /// These options with `shortest_s` reduced to the argument if it is larger.
     pub fn down_to(self, shortest_s: f64) -> Options {
         Options { shortest_s: self.shortest_s.min(shortest_s), ..self }
     }
@@ -144,7 +143,7 @@ pub enum ReconstructError {
         /// Largest airspeed in the log, m/s.
         fastest_mps: f64,
     },
-    /// No stretch is long enough.
+    /// No stretch of the flight without a gap is long enough.
     #[error(
         "cannot reconstruct {flight}: its longest stretch in flight without a gap is {longest_s:.1} s, \
          under {shortest_s:.1} s; give a longer log, or one with a steadier logging rate"
@@ -152,7 +151,7 @@ pub enum ReconstructError {
     TooShort {
         /// Name of the flight.
         flight: String,
-        /// Longest stretch, s.
+        /// Length of the longest stretch, s.
         longest_s: f64,
         /// Shortest stretch that can be reconstructed, s.
         shortest_s: f64,
@@ -165,7 +164,7 @@ pub enum ReconstructError {
     NoPath {
         /// Name of the flight.
         flight: String,
-        /// Reason, in words.
+        /// The reason, in words.
         why: &'static str,
     },
 }
@@ -174,8 +173,8 @@ pub enum ReconstructError {
 /// flight that is passed by value is dropped after the resampling, to free its memory.
 ///
 /// # Errors
-/// A required channel is missing, the log contains no flight or no stretch of it is long enough, or its sensors
-/// contradict one another.
+/// If a required channel is missing, the log contains no flight, no stretch of it is long enough, or no path fits the
+/// sensors.
 pub fn reconstruct(
     flight: impl Borrow<Flight>,
     options: &Options,

@@ -1,4 +1,4 @@
-//! Estimators of noise: white part of a signal, robust level of residuals, correlation of residuals in time.
+//! Estimators of noise: white part of a signal, robust root mean square of residuals, correlation of residuals in time.
 
 use greylag_num::statistics::quantile;
 
@@ -37,8 +37,8 @@ pub fn level(residuals: &mut [f64]) -> f64 {
     (sum / residuals.len() as f64).sqrt()
 }
 
-/// Ratio of the standard deviation of the block means of `residuals` to that of white noise, for blocks of `block` values.
-/// 1 if the ratio is not significantly above 1.
+/// Ratio of two standard deviations of the means over blocks of `block` values: that of `residuals`, and that of white noise
+/// with the same variance. The result is 1 if the ratio is not significantly above 1.
 pub fn colour(residuals: &[f64], block: usize) -> f64 {
     let count = residuals.len() / block.max(1);
     if block < 2 || count < FEWEST {

@@ -1,4 +1,7 @@
-//! Constants estimated together with the path (sensor errors, wind, Earth's rate): indices, names, units and priors.
+//! Constants that are estimated together with the path (sensor errors, wind, Earth's rate): indices, names, units and priors.
+//!
+//! The path is the reconstructed motion. An instant is one sample of it. Between instants, gyros and accelerometers predict the
+//! motion.
 
 use crate::flight_path::Options;
 use crate::flight_path::intake::{Log, Present, Span};
@@ -29,7 +32,7 @@ const BETA_GAIN: usize = VANE_GAIN + 1;
 pub const AIRSPEED_OFFSET: usize = 12;
 /// Index of the offset of the measured heading relative to the velocity over ground, rad.
 pub const HEADING: usize = 13;
-/// Index of the first constant that acts between instants. Constants with smaller indices act at instants.
+/// Index of the first constant that acts between instants. Constants with smaller indices act on the measurements at instants.
 pub const INERTIAL: usize = 14;
 /// First index of the gyro biases p, q, r in the middle of the flight, rad/s.
 pub const GYRO: usize = 14;
@@ -63,7 +66,7 @@ pub const ORDER: [usize; BEND] = [
     6, 20, 7, 8, 9,
 ];
 
-/// Prior standard deviation of a clock skew, in sampling intervals: the 95 % interval is ±1.5 sampling intervals.
+/// Prior standard deviation of a delay, in sampling intervals. The 95 % interval is ±1.5 sampling intervals.
 pub const SKEW_SAMPLES: f64 = 0.77;
 
 /// Values of the constants.
@@ -101,7 +104,7 @@ impl Span {
     }
 }
 
-/// Prior standard deviation of a constant that is held or known exactly, relative to its usual prior standard deviation. A
+/// Prior standard deviation of a constant that is held or known exactly, as a fraction of its usual prior standard deviation. A
 /// value above zero keeps the equations regular.
 const HELD: f64 = 1e-4;
 
@@ -122,13 +125,13 @@ const SELDOM: [(usize, f64); 10] = [
 /// Prior standard deviation of a delay that a flight has shown to be unusually long, s.
 const LATE: f64 = 0.5;
 
-/// Prior standard deviation of a constant that a flight has shown significantly. `None` for a constant that is always free.
+/// Prior standard deviation of a constant that a flight has shown to be significant. `None` for a constant that is always free.
 pub fn wide(place: usize) -> Option<f64> {
     let late = matches!(place, SKEW_ATTITUDE..=SKEW_VELOCITY | SKEW_FORCE);
     SELDOM.iter().find(|(of, _)| *of == place).map(|(_, width)| *width).or(late.then_some(LATE))
 }
 
-/// Whether a constant with the prior standard deviation `width` is still held at its prior mean.
+/// Whether a rare instrument error, whose prior standard deviation is `width`, is still held at its prior mean.
 pub fn held(place: usize, width: f64) -> bool {
     SELDOM.iter().any(|(of, wide)| *of == place && width <= 2.0 * HELD * wide)
 }
@@ -197,7 +200,8 @@ pub fn gyro_bias_of(axis: usize, time: f64, span: &Span) -> [(usize, f64); 2 + K
         1 => (DRIFT + axis, since_middle),
         _ => {
             let knot = (i - 2) as f64 - 0.5 * (KNOTS - 1) as f64;
-            // a change acts from its knot towards the nearer end of the flight: the bias in the middle does not change
+            // a change acts from its knot to the nearer end of the flight, so that the bias in the middle of the flight does
+            // not change
             let beyond = match knot {
                 ..0.0 => (since_middle - knot * span.apart()).min(0.0),
                 _ => (since_middle - knot * span.apart()).max(0.0),
@@ -214,18 +218,18 @@ pub fn gyro_bias(values: &Values, time: f64, span: &Span) -> [f64; 3] {
     })
 }
 
-/// `measured` on three axes divided by 1 + gain: measured = (1 + gain) · (true + bias). `first` is the index of the first
-/// gain.
+/// The three-axis measurement `measured` divided by 1 + gain: measured = (1 + gain) · (true + bias). `first` is the index of
+/// the first gain.
 pub fn without_gain(values: &Values, first: usize, measured: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| measured[axis] / (1.0 + values[first + axis]))
 }
 
-/// Offset added to a constant in the result: 1 for the airspeed scale, which the result states as a factor, else 0.
+/// Number that is added to a constant in the result: 1 for the airspeed scale, which the result states as a factor, else 0.
 pub fn offset(place: usize) -> f64 {
     if place == SCALE { 1.0 } else { 0.0 }
 }
 
-/// Whether the log contains the sensor to which a constant belongs. False for constants that are not reported.
+/// Whether the log contains the sensor to which a constant belongs. False for constants that the result does not contain.
 pub fn concerned(place: usize, has: &Present) -> bool {
     match place {
         ALPHA | VANE_GAIN => has.alpha,
@@ -240,11 +244,11 @@ pub fn concerned(place: usize, has: &Present) -> bool {
     }
 }
 
-/// Whether a constant is unobservable in the log.
+/// Whether the log cannot determine a constant.
 ///
-/// Without accelerometers and velocity over ground, the air-data sensors are not related to one another. Only the
-/// smoothness of the path then determines the constants, and a slow flight is smoother. In a flight without sensor errors,
-/// the airspeed scale was estimated as four.
+/// Without accelerometers and velocity over ground, the air-data sensors are not related to one another. Only the smoothness of
+/// the path then determines the constants, and a slow flight is smoother. In a flight without sensor errors, the airspeed scale
+/// was estimated as four instead of one.
 pub fn unseeable(place: usize, has: &Present) -> bool {
     let of_the_air = place < SKEW_ATTITUDE
         || place == SKEW_AIRSPEED

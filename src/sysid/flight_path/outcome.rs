@@ -1,5 +1,5 @@
-//! Conversion of the smoother's result to a reconstruction: states, sensor errors, remaining errors, actuator delay and
-//! notes.
+//! Conversion of the smoother's result to the reconstruction of a flight: states, sensor errors, remaining errors of the states,
+//! delay of the recorded actuators, and notes.
 
 use nalgebra::Vector3;
 
@@ -20,33 +20,34 @@ use greylag_num::stream::stream;
 use greylag_physics::sensors::Known;
 use greylag_physics::{Controls, State};
 
-/// A constant counts as unobservable if its posterior standard deviation exceeds this fraction of its prior standard
-/// deviation.
+/// A constant (sensor error or wind) counts as unobservable if its posterior standard deviation exceeds this fraction of its
+/// prior standard deviation.
 const UNSEEN: f64 = 0.7;
-/// Distance of an estimate from its prior mean, in prior standard deviations, above which a note is written.
+/// A note is written if an estimate differs from its prior mean by more than this number of prior standard deviations.
 const FAR: f64 = 3.0;
-/// Standard deviation of the gusts above which a note is written, m/s.
+/// A note is written if the standard deviation of the gusts exceeds this value, m/s.
 const ROUGH: f64 = 0.1;
 /// Smallest actuator delay that is corrected, in sampling intervals. A smaller delay is within the error of the regression.
 const CORRECTED: f64 = 0.25;
 
-/// Length of the blocks over which the difference between estimated and measured attitude is averaged, s. The means count
-/// as a systematic error, not as noise.
+/// Length of the blocks over which the difference between estimated and measured attitude is averaged, s. These means count as a
+/// systematic error and not as noise.
 const DISAGREEING: f64 = 4.0;
 
-/// Standard deviations of the constant errors of a flight controller's pitch and heading, rad.
+/// Standard deviations of the constant errors of pitch and heading that a flight controller's estimator records, rad.
 ///
-/// A log does not show these errors: an estimator that attributes an accelerometer bias to pitch corrects the accelerations
-/// consistently. PX4 in SITL has errors of 0.14° to 0.22° in pitch and 0.11° to 0.30° in heading
-/// (results/notes/2026-11-27-flight-path-reconstruction.md). A real board levelled by hand and a compass calibrated by hand
-/// are assumed to have at least these errors.
+/// A log does not show these errors. For example, if the estimator takes an accelerometer bias for a pitch error, its attitude
+/// and its corrected accelerations still agree with each other. PX4 in SITL has errors of 0.14° to 0.22° in pitch and 0.11° to
+/// 0.30° in heading (results/notes/2026-11-27-flight-path-reconstruction.md). A real board levelled by hand and a compass
+/// calibrated by hand are assumed to have at least these errors.
 const ALIGNED: [f64; 2] = [0.25 * DEGREE, 0.5 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// Number of random draws of the path's errors. They determine the RMS errors over a flight to a few percent.
+/// Number of random draws of the error of the path. With three draws, the RMS errors over a flight are accurate to a few
+/// percent.
 const DRAWS: usize = 3;
 
-/// Assembles the reconstruction.
+/// Assembles the reconstruction from the result `found` of the smoother.
 ///
 /// # Errors
 /// [`ReconstructError::NoPath`] if the equations of the simulated path errors are singular.
@@ -109,8 +110,8 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     })
 }
 
-/// Simulates the error of the path in copies of the flight. Returns the root mean square error of each state, and the
-/// actuator delays estimated from each copy. The errors of the body rates are the noise levels of the gyros.
+/// Simulates the error of the path in random copies of the flight. Returns the root mean square error of each state, and the
+/// actuator delays that are estimated from each copy. The returned errors of the body rates are the noise levels of the gyros.
 fn draws(
     problem: &Problem,
     found: &Found,
@@ -140,7 +141,7 @@ fn draws(
     Ok((left, delays))
 }
 
-/// Segments with the states of `paths`. The noise `gyro` (rad/s), if given, is added to the body rates.
+/// Makes segments with the states of `paths`. If the noise `gyro` (rad/s) is given, it is added to the body rates.
 fn path_as_segments(
     problem: &Problem,
     found: &Found,
@@ -186,7 +187,7 @@ fn segment(
                 let gain = if log.has.force { 1.0 + values[FORCE_GAIN + i] } else { 1.0 };
                 force[k][i] / gain - values[FORCE + i]
             }),
-            // Without an altitude, the air density at sea level is used; the notes state this.
+            // Without a recorded altitude, sea level is assumed; the notes state this.
             altitude: Some(track.altitude[k]).filter(|h| h.is_finite()).unwrap_or(0.0),
             density: track.density[k],
         }
@@ -194,8 +195,8 @@ fn segment(
     Segment { instants: (0..track.len()).map(instant).collect() }
 }
 
-/// Specific force of a path without accelerometers: acceleration less gravity, body axes, m/s². NaN at samples without a
-/// measured velocity, and at both ends.
+/// Specific force along a path, for a log without accelerometers: acceleration minus gravity, body axes, m/s². NaN at samples
+/// without a measured velocity, and at both ends.
 fn path_force(track: &Track, path: &Path, log: &Log, gravity: f64) -> Vec<Vector3<f64>> {
     let nan = Vector3::repeat(f64::NAN);
     let down = Vector3::new(0.0, 0.0, gravity);
@@ -209,12 +210,13 @@ fn path_force(track: &Track, path: &Path, log: &Log, gravity: f64) -> Vec<Vector
     (0..path.len()).map(at).collect()
 }
 
-/// Whether the delay of the recorded deflections is significant (2 standard deviations) and large enough to be corrected.
+/// Whether the delay of the recorded deflections is significant (at least 2 standard deviations) and large enough to be
+/// corrected.
 fn late_beyond_doubt(skew: &Skew, step: f64) -> bool {
     skew.late.abs() >= CORRECTED * step && skew.late.abs() >= 2.0 * skew.deviation
 }
 
-/// Removes the delay of the deflections by linear interpolation.
+/// Removes the delay of the recorded deflections by linear interpolation.
 fn correct(segments: &mut [Segment], skew: &Skew, step: f64) {
     let late = skew.late / step;
     for segment in segments {
@@ -236,7 +238,7 @@ fn correct(segments: &mut [Segment], skew: &Skew, step: f64) {
     }
 }
 
-/// Estimated constants of the log's sensors; the airspeed scale is stated as a factor.
+/// Estimated constants of the sensors that the log has. The airspeed scale is stated as a factor.
 fn nuisances(problem: &Problem, smoothed: &Found) -> Vec<Nuisance> {
     nuisance::ORDER
         .into_iter()
@@ -257,13 +259,14 @@ fn nuisances(problem: &Problem, smoothed: &Found) -> Vec<Nuisance> {
         .collect()
 }
 
-/// Standard deviations of α and β without vanes, rad, as nuisances with the value zero. No entry for an angle with a vane.
+/// Standard deviations of α and β without vanes, rad, as nuisance parameters with the value zero. An angle with a vane has no
+/// entry.
 ///
-/// The variance has four parts: the uncertainty of the wind, the uncertainty of the path, the slow difference between
-/// estimated and measured pitch and heading, and the constant error of the measured pitch and heading.
+/// Four standard deviations are combined: that of the wind, that of the path, the slow difference between estimated and measured
+/// pitch or heading, and the constant error of the measured pitch or heading.
 ///
-/// Noise alone does not represent these errors. If gyros and compass differ by a degree over half a minute, the heading has
-/// an error of at least this size. The standard deviation of β includes this error.
+/// The first two, which follow from noise, are not sufficient. For example, if gyros and compass differ by a degree over half a
+/// minute, the heading has an error of at least this size, and so has β.
 fn unmeasured_angles(
     problem: &Problem,
     smoothed: &Found,
@@ -316,7 +319,7 @@ fn declare(problem: &Problem, smoothed: &Found, found: &[Nuisance], notes: &mut 
     }
     let unseen = |place: &usize| {
         let stated = log.sensors.known(nuisance::NAMES[*place].0).is_some();
-        // an unobservable drift is too slow to be relevant in this flight
+        // drifts are omitted, because an unobservable drift is too slow to be relevant in this flight
         !stated
             && !nuisance::held(*place, problem.widths[*place])
             && !(DRIFT..BEND).contains(place)

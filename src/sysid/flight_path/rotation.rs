@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Matrix C of the cross product with `v`: C x = v × x.
+/// The matrix C of the cross product with `v`, such that C x = v × x.
 pub fn cross(v: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
 }
@@ -20,7 +20,7 @@ pub fn exp(turn: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::identity() + k * a + k * k * b
 }
 
-/// Rotation vector of a rotation by less than π, rad.
+/// Rotation vector (rad) of the rotation matrix `r`. The rotation must be by less than π.
 pub fn log(r: &Matrix3<f64>) -> Vector3<f64> {
     let half = Vector3::new(r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12) * 0.5;
     let sine = half.norm();
@@ -28,7 +28,7 @@ pub fn log(r: &Matrix3<f64>) -> Vector3<f64> {
     if sine < 1e-8 { half } else { half * (sine.atan2(cosine) / sine) }
 }
 
-/// Rotation from body to earth axes for the Euler angles roll, pitch, yaw (ZYX), rad.
+/// Rotation matrix from body to earth axes for the Euler angles roll, pitch and yaw (ZYX), rad.
 pub fn from_euler([roll, pitch, yaw]: [f64; 3]) -> Matrix3<f64> {
     let ((sr, cr), (sp, cp), (sy, cy)) = (roll.sin_cos(), pitch.sin_cos(), yaw.sin_cos());
     Matrix3::new(
@@ -44,13 +44,13 @@ pub fn from_euler([roll, pitch, yaw]: [f64; 3]) -> Matrix3<f64> {
     )
 }
 
-/// Roll, pitch, yaw (ZYX) of a rotation from body to earth axes, rad.
+/// Roll, pitch and yaw (ZYX, rad) of the rotation matrix `r` from body to earth axes.
 pub fn to_euler(r: &Matrix3<f64>) -> [f64; 3] {
     [r.m32.atan2(r.m33), (-r.m31).clamp(-1.0, 1.0).asin(), r.m21.atan2(r.m11)]
 }
 
-/// Derivatives of roll, pitch and yaw (rows) with respect to a small rotation about body x, y, z (columns). `None` for cos θ
-/// below 0.05.
+/// Derivatives of roll, pitch and yaw (rows) with respect to a small rotation about body x, y and z (columns). `None` near a
+/// pitch angle θ of ±90°, where cos θ is at most 0.05.
 pub fn euler_by_turn(r: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let (sp, cp) = (-r.m31, r.m32.hypot(r.m33));
     (cp > 0.05).then(|| {

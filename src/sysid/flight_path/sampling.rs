@@ -1,10 +1,12 @@
-//! Sampling of a log's body rates: stated in the log, or inferred from the estimated clock skews.
+//! Sampling of a log's body rates: a sample is the value at an instant, or a value that holds until the next sample. The log
+//! states which, or it is inferred from the clock skews, the estimated delays of the other sensors relative to the rates.
 //!
-//! A simulator with explicit Euler steps logs the rate that it holds until the next sample. If this rate is interpreted as
-//! a sample at an instant, it is half a sample period early. Every other sensor then seems delayed by half a period. A log
-//! that does not state its sampling is first interpreted as samples at instants. The rates count as held if every
-//! well-determined clock skew is half a period under samples at instants, and zero under held rates. Means over a sample
-//! period need no separate case: they delay the gyros by half a period, and the estimated clock skews include this delay.
+//! A simulator with explicit Euler steps logs the rate that it holds until the next sample. If such a rate is taken for the
+//! value at an instant, it is half a sample period early, and every other sensor seems delayed by half a period. A log
+//! that does not state its sampling is therefore reconstructed with values at instants first. If all well-determined
+//! clock skews are half a period, it is reconstructed again with held rates. If the skews are zero in this second
+//! reconstruction, the rates count as held. Rates that are means over a sample period need no separate case: they are
+//! delayed by half a period, which the clock skews include.
 
 use crate::flight_path::ReconstructError;
 use crate::flight_path::equations::{Found, Problem};
@@ -19,23 +21,22 @@ use greylag_logs::Sampling;
 const FEWEST: usize = 2;
 /// A clock skew counts as well determined if its standard deviation is below this fraction of the sample period.
 const KNOWN: f64 = 0.1;
-/// Tolerance for the clock skews of a simulator, as a fraction of the sample period. It covers the differences due to
-/// interpolation errors.
+/// Tolerance for clock skews, as a fraction of the sample period. It covers interpolation errors.
 const AGREE: f64 = 0.03;
-/// Additional tolerance, in standard deviations of the clock skew.
+/// Additional tolerance, in standard deviations of the estimated clock skew.
 const DEVIATIONS: f64 = 3.0;
 
-/// The sampling of a log, the path estimated with this sampling, and a note on the choice.
+/// The sampling of a log, and the path estimated with this sampling.
 pub struct Chosen {
     /// Meaning of a rate sample.
     pub sampling: Sampling,
     /// Estimated path and constants.
     pub found: Found,
-    /// Evidence for the choice, if the log does not state the sampling.
+    /// Note with the reason, if the rates were found to be held.
     pub note: Option<String>,
 }
 
-/// Smooths the log of `problem` under the sampling `declared`, or else under the sampling that the clock skews support.
+/// Estimates the path for the sampling `declared`. If it is `None`, the sampling is inferred from the clock skews.
 ///
 /// # Errors
 /// [`ReconstructError::NoPath`] if the search has no finite result.
@@ -60,7 +61,7 @@ pub fn choose(problem: &Problem, declared: Option<Sampling>) -> Result<Chosen, R
     Ok(Chosen { sampling: Sampling::Instants, found: instants, note: None })
 }
 
-/// Whether all well-determined clock skews of the log equal `late` (s) within tolerance, and there are enough of them.
+/// Whether there are enough well-determined clock skews, and all of them equal `late` (s) within the tolerance.
 fn agree(log: &Log, found: &Found, late: f64) -> bool {
     let clocks = [SKEW_ATTITUDE, SKEW_AIRSPEED, SKEW_VANES, SKEW_VELOCITY, SKEW_FORCE];
     let known: Vec<usize> = clocks

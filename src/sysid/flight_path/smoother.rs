@@ -1,9 +1,10 @@
-//! The smoother: fits path and constants to all sensors by Gauss–Newton iterations.
+//! The smoother of the flight-path reconstruction: fits path and constants to all sensors by Gauss–Newton iterations. The path
+//! is attitude, velocity and gust over time. The constants are sensor errors and the steady wind.
 //!
-//! First, motion and constants are fitted; gusts count as noise of the air-data sensors. If the data make gusts more likely
-//! than white noise, gusts along the path are then estimated with the constants held. The standard deviations of the
-//! constants are raised by the effect of these gusts. A joint estimate of path, gusts and constants would give an airspeed
-//! scale far above 1, because a large scale makes every gust smaller.
+//! First, motion and constants are fitted. Gusts then count as noise of the air-data sensors. If the data make gusts more
+//! likely than white noise, gusts along the path are estimated afterwards, while the constants keep their values. The standard
+//! deviations of the constants are raised by the effect of these gusts. A joint estimate of path, gusts and constants would
+//! give an airspeed scale far above 1, because a large scale makes every gust smaller.
 
 use nalgebra::Vector3;
 
@@ -80,11 +81,12 @@ fn calm(problem: &Problem, found: &mut Found, from: usize) -> Result<(), Reconst
     Ok(())
 }
 
-/// Takes the step, or its largest fraction (by halving) that does not raise the merit function. Without such a fraction, no
-/// step is taken. Returns the largest change of a constant in its standard deviations.
+/// Line search: applies the Gauss–Newton step `solved` to `found`, or the largest of its fractions ½, ¼ … that does not raise
+/// the merit function. If there is none, `found` keeps its path and constants. Returns the largest change of a constant in its
+/// standard deviations.
 ///
-/// In a nearly straight flight, wind, airspeed scale and path are confounded. Without this line search, the first minute of
-/// a real ArduPlane flight gave a wrong wind of 5 m/s.
+/// In a nearly straight flight, wind, airspeed scale and path are confounded. Without the line search, a wrong wind of 5 m/s
+/// was estimated from the first minute of a real ArduPlane flight.
 fn search(
     problem: &Problem,
     found: &mut Found,
@@ -112,7 +114,7 @@ fn gusty(
     found: &mut Found,
     singular: &dyn Fn() -> ReconstructError,
 ) -> Result<(), ReconstructError> {
-    // if a vane is missing, a filter or a delay of the airspeed would be estimated as vertical gusts
+    // if a vane is missing, a filter or a delay of the airspeed sensor would be mistaken for vertical gusts
     if !(problem.log.has.alpha && problem.log.has.beta) {
         return Ok(());
     }
@@ -165,7 +167,8 @@ fn likeliest_gusts(problem: &Problem, found: &Found) -> Option<f64> {
     Some(best)
 }
 
-/// Initialises the wind with the stated wind, or else with the mean difference between measured and guessed velocities.
+/// Initialises the wind with the wind that the user states in the description of the sensors, or else with the mean
+/// difference between measured and guessed velocities.
 fn start(found: &mut Found, problem: &Problem) {
     let mut sum = (Vector3::zeros(), 0.0);
     for (path, track) in found.paths.iter().zip(&problem.log.tracks) {

@@ -1,27 +1,29 @@
-//! Misalignment of the measured axes: a small constant rotation relative to the body axes.
+//! Misalignment of the sensors: a small constant rotation of the measured axes relative to the body axes.
 //!
-//! ε (rad, body axes) is the rotation from the body axes to the axes of the board or the markers. The coordinates of a
-//! vector x in the rotated axes are x − ε × x = x + x × ε to first order (Stevens, Lewis and Johnson, Aircraft Control and
-//! Simulation, section 1.3). This formula applies to body rates, specific force and the velocity relative to the air.
+//! ε (rad, body axes) is the rotation from the body axes to the axes of the sensor board or of the motion-capture markers. To
+//! first order, a vector x has the coordinates x − ε × x = x + x × ε in the rotated axes (Stevens, Lewis and Johnson, Aircraft
+//! Control and Simulation, section 1.3). This formula applies to body rates, specific force and the velocity relative to the
+//! air.
 //!
-//! The path is smoothed in the axes of gyros and attitude. Without vanes, α and β also refer to these axes. Vanes measure
-//! in the body axes. With vanes, the reconstruction attributes the mean effect of the misalignment on α and β to the vane
-//! biases. Apart from this mean, α and β of the path follow the vanes.
+//! The reconstruction smooths the path in the rotated axes, which are those of gyros and attitude. Without vanes, α and β refer
+//! to these axes too. Vanes measure in the body axes. With vanes, the reconstruction attributes the mean effect of the
+//! misalignment on α and β to the vane biases. Apart from this mean, the reconstructed α and β follow the vanes.
 
 use crate::flight_path::reconstruction::{Instant, Reconstruction};
 
-/// Identifier of the misalignment among the measurement errors.
+/// Identifier of the misalignment in the list of measurement errors.
 pub const ID: &str = "axes_askew";
 /// Names of the angles, about body x, y and z.
 pub const NAMES: [&str; 3] = ["askew_roll", "askew_pitch", "askew_yaw"];
 
-/// Change of the coordinates `x` of a vector per rad of each angle: x × e, with the unit vector e of the body axis.
+/// Changes of the coordinates `x` of a vector, per rad of rotation about each body axis: x × e, with the unit vector e of the
+/// axis.
 pub fn vector(x: [f64; 3]) -> [[f64; 3]; 3] {
     let [x, y, z] = x;
     [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
 }
 
-/// Changes of α and β per rad of each angle, from the rotation of the velocity V (cos α cos β, sin β, sin α cos β).
+/// Changes of α and β per rad of each angle. They follow from the rotation of the velocity V (cos α cos β, sin β, sin α cos β).
 pub fn flow(alpha: f64, beta: f64) -> [[f64; 2]; 3] {
     let ((sin, cos), tan_beta) = (alpha.sin_cos(), beta.tan());
     [[-cos * tan_beta, sin], [1.0, 0.0], [-sin * tan_beta, -cos]]
@@ -43,7 +45,7 @@ pub struct Turning {
 }
 
 impl Turning {
-    /// The changes for `flight`; means are taken over `segments`.
+    /// Computes the changes for `flight`, with means over `segments`.
     pub fn of(flight: &Reconstruction, segments: &[Vec<Instant>]) -> Turning {
         let vane = |name: &str| flight.nuisances.iter().any(|n| n.name == name);
         let mut sums = [[0.0; 3]; 2];
@@ -60,8 +62,8 @@ impl Turning {
         }
     }
 
-    /// The changes at `alpha` and `beta` (rad). A flow angle that a vane measures has its mean change. A flow angle without
-    /// a vane has the change that [`flow`] returns.
+    /// Returns the changes at `alpha` and `beta` (rad). For a flow angle with a vane, this is the mean change over the flight.
+    /// For a flow angle without a vane, it is the change that [`flow`] returns.
     pub fn at(&self, alpha: f64, beta: f64) -> [[f64; 2]; 3] {
         let turned = flow(alpha, beta);
         std::array::from_fn(|axis| {
@@ -71,8 +73,8 @@ impl Turning {
     }
 }
 
-/// Changes of a measured state per rad of each angle, in the order and units of the state. `turning` gives the changes of α
-/// and β.
+/// Changes of the measured state `state` per rad of each angle, in the order and units of the state. `turning` gives the changes
+/// of α and β.
 pub fn state(turning: &Turning, state: &[f64; 8]) -> [[f64; 8]; NAMES.len()] {
     let [roll, pitch, _, p, q, r, alpha, beta] = *state;
     let attitude = attitude(roll, pitch);
@@ -88,7 +90,7 @@ mod tests {
     use super::*;
     use nalgebra::{Rotation3, Vector3};
 
-    /// The analytic changes equal finite differences of rotation matrices.
+    /// The analytic changes must equal finite differences of rotation matrices.
     #[test]
     fn a_small_turn_moves_vectors_angles_and_attitude() {
         const STEP: f64 = 1e-6;

@@ -1,8 +1,9 @@
-//! Constants that differ between the flights of one aircraft: trims, and the misalignment of the measured axes.
+//! Constants that differ between the flights of one aircraft: trims (constants added to force and moment coefficients), and the
+//! misalignment of the measured axes.
 //!
 //! Loading, the setting of a surface, a battery or a propeller may change between two flights. An autopilot's board or the
-//! markers of motion capture may be removed and mounted again. The model lacks no effect in these cases. The constants are
-//! estimated only on request, for each flight, in addition to the coefficients common to all flights.
+//! markers of motion capture may be removed and mounted again. In these cases the model does not lack an effect. The
+//! constants are estimated only on request, for each flight, in addition to the coefficients common to all flights.
 
 pub mod askew;
 pub mod known;
@@ -24,8 +25,8 @@ pub struct PerFlight {
     pub sensors: SensorErrors,
 }
 
-/// Use of the errors of airspeed, angle of attack and sideslip that all fitted flights have in common. A fit always
-/// estimates the sensor errors of its own flights. As errors of the installation they correct other flights too.
+/// Use of the errors of airspeed, angle of attack and sideslip that all fitted flights have in common. A fit always estimates
+/// the sensor errors of its flights. If the common errors become errors of the installation, they correct other flights too.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SensorErrors {

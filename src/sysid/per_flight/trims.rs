@@ -1,7 +1,8 @@
-//! Trims of each flight: constants added to the model's coefficients, and a relative change of the thrust.
+//! Trims of a flight: constants that are added to the force and moment coefficients of a model, and a relative change of the
+//! thrust. They differ between flights of one aircraft, for example because of its loading.
 //!
-//! The trims are added to a model as an effect outside the catalogue. The model does not need coefficients of the same
-//! names.
+//! The trims are added to a model as an effect (a group of terms) that is not in the catalogue. The model need not have
+//! coefficients with these names.
 
 use greylag_model::{GreyBox, JoinError};
 use greylag_physics::formula::register;
@@ -9,9 +10,9 @@ use greylag_physics::formula::register;
 /// A trim with its prior standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trim {
-    /// Name of the trim. A trim of a coefficient has the name of the coefficient in the catalogue.
+    /// Name of the trim: the coefficient to which it is added, or `thrust_share`.
     pub name: &'static str,
-    /// Standard deviation between flights, dimensionless.
+    /// Prior standard deviation between flights of one aircraft, dimensionless.
     pub width: f64,
 }
 
@@ -19,13 +20,15 @@ const fn trim(name: &'static str, width: f64) -> Trim {
     Trim { name, width }
 }
 
-/// The trims in the order of the effect's coefficients, with their assumed standard deviations between flights of one
-/// aircraft.
+/// The trims in the order of the effect's coefficients, with their prior standard deviations.
 ///
-/// The following causes are assumed. Lift: half a degree of incidence of a wing that was mounted again, at a slope of 4 to
-/// 5 per rad. Pitch: a shift of the centre of gravity by 1 to 2 % of the chord at a lift coefficient of 0.5, or half a
-/// degree of elevator. Roll and yaw: a degree of one surface. Side force: two degrees of a fin. Drag: a hatch, tape or a
-/// dirty wing. Thrust: the squared voltage of a battery between full and half empty, or another propeller.
+/// They allow for the following causes:
+/// - Lift: half a degree of incidence of a wing that was mounted again, at a lift slope of 4 to 5 per rad.
+/// - Pitch: a shift of the centre of gravity by 1 to 2 % of the chord at a lift coefficient of 0.5, or half a degree of elevator.
+/// - Roll and yaw: a degree of one surface.
+/// - Side force: two degrees of a fin.
+/// - Drag: a hatch, tape or a dirty wing.
+/// - Thrust: the square of the voltage between a full and a half empty battery, or another propeller.
 pub const TRIMS: [Trim; 7] = [
     trim("CD0", 0.005),
     trim("CL0", 0.03),
@@ -38,19 +41,19 @@ pub const TRIMS: [Trim; 7] = [
 
 const ID: &str = "flight_trims";
 
-/// `model` with the trims as its last coefficients, all zero.
+/// Returns `model` with the trims as its last coefficients. Their values are zero.
 ///
 /// # Errors
 /// The model already has the effect `flight_trims`.
 pub fn joined(model: &GreyBox) -> Result<GreyBox, JoinError> {
-    // the result is not needed: after an error in this built-in text, `join` fails because the effect is not registered
+    // an error in this built-in text needs no report here: without the effect, `join` fails
     let _ = register::read(include_str!("flight_trims.toml"));
     let mut with = model.clone();
     with.join(ID, &[0.0; TRIMS.len()])?;
     Ok(with)
 }
 
-/// Sets the trims of a model from [`joined`] to `values`, in the order of `TRIMS`.
+/// Sets the trims of `model`, which [`joined`] has returned, to `values` in the order of `TRIMS`.
 pub fn set(model: &mut GreyBox, values: &[f64]) {
     let mut all: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
     let first = all.len().saturating_sub(values.len());

@@ -1,4 +1,5 @@
-//! Kernel of the weak form: a Hann window as the test function.
+//! Kernel of the weak form. The weak form multiplies the equations of motion by a smooth kernel and integrates by parts, so
+//! that measured data need not be differentiated. The kernel is a Hann window.
 
 use std::f64::consts::TAU;
 

@@ -1,4 +1,5 @@
-//! The weak form: the equations of motion integrated with smooth kernels. No signal is differentiated.
+//! The weak form of the equations of motion: they are multiplied by a smooth weighting function (the kernel) and integrated by
+//! parts over a window of flight. No measured signal has to be differentiated.
 
 pub(super) mod channels;
 pub mod kernel;

@@ -1,5 +1,6 @@
-//! Preparation of a reconstructed flight for a comparison: resamples to model steps, keeps the parts in flight, and divides
-//! them into windows.
+//! Prepares a reconstructed flight for a comparison with models. The flight is resampled to model steps, the parts in flight
+//! are kept, and they are divided into windows. In the weak form, the equations of motion are integrated over a window with
+//! a smooth weight, the kernel. A regime variable, such as α, describes the flight condition in a window.
 
 use std::borrow::Cow;
 use std::f64::consts::{PI, TAU};
@@ -15,7 +16,7 @@ use greylag_physics::State;
 /// Airspeed below which an aircraft of any size counts as not in flight, m/s.
 const FLYING_FLOOR: f64 = 3.0;
 
-/// Error of a flight whose sampling interval is outside 1e-6 to 1 s.
+/// The sampling interval of a flight is outside 1e-6 to 1 s.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("flight {flight} has a sampling interval of {step_s} s; it must be 1e-6 to 1 s")]
 pub struct ClockError {
@@ -38,14 +39,14 @@ pub struct Prepared {
     pub sampling: Sampling,
     /// Stretches in flight without gaps.
     pub segments: Vec<Vec<Instant>>,
-    /// Standard deviations of the white noise of roll, pitch, airspeed, p, q, r, α, β after reconstruction, in the units of the
-    /// state; 0 if not known.
+    /// Standard deviations of the white noise that roll, pitch, airspeed, p, q, r, α and β have after the reconstruction, in the
+    /// units of the state; 0 if not known.
     pub noise: [f64; 8],
     /// Standard deviations of the specific force's white noise, body axes, m/s²; 0 if not known.
     pub force_noise: [f64; 3],
-    /// Changes of α and β with the misalignment of the measured axes.
+    /// Mean changes of α and β over the flight, per rad of misalignment of the sensor axes.
     pub turning: Turning,
-    /// Kernel for the sampling interval `dt`.
+    /// Kernel sampled at the interval `dt`.
     pub kernel: Kernel,
     /// Windows in time order.
     pub windows: Vec<Window>,
@@ -54,21 +55,22 @@ pub struct Prepared {
 /// A window of the weak form.
 #[derive(Clone, Debug)]
 pub struct Window {
-    /// Index of the segment.
+    /// Index of the segment that contains the window.
     pub segment: usize,
     /// Index of the window's first sample in the segment.
     pub start: usize,
     /// Time of the window's middle on the log's clock, s.
     pub time_s: f64,
-    /// Regime variables in the order and units of [`RegimeVariable::CONTINUOUS`].
+    /// Means of the regime variables over the window, in the order and units of [`RegimeVariable::CONTINUOUS`].
     pub regime: [f64; RegimeVariable::CONTINUOUS.len()],
 }
 
 impl Prepared {
-    /// Resamples `flight` to a multiple of the model step and keeps the parts with an airspeed of at least `slowest` and 3 m/s.
+    /// Keeps the parts of `flight` with an airspeed of at least `slowest` (m/s), or of 3 m/s if that is more, and resamples them
+    /// to a multiple of the model step.
     ///
     /// # Errors
-    /// The sampling interval of `flight` lies outside 1e-6 to 1 s.
+    /// If the sampling interval of `flight` is outside 1e-6 to 1 s.
     pub fn new(flight: &Reconstruction, slowest: f64) -> Result<Prepared, ClockError> {
         let substeps = substeps(flight)?;
         let dt = STEP * substeps as f64;
@@ -123,8 +125,8 @@ impl Prepared {
         }
     }
 
-    /// The flight with acting deflections: the recorded deflections passed through the input effects of `model`, for
-    /// example an actuator lag.
+    /// The flight with the deflections that act on the aircraft according to `model`. They are the recorded deflections, passed
+    /// through the input effects of `model`, for example an actuator lag.
     pub fn acting(&self, model: &GreyBox) -> Cow<'_, Prepared> {
         if model.acts_at_once() {
             return Cow::Borrowed(self);
@@ -151,10 +153,8 @@ impl Prepared {
         Cow::Owned(acting)
     }
 
-    /// `model` with the integrator that matches this flight's sampling.
-    ///
-    /// For held rates of a simulator, the integrator of the model is kept. For samples at instants, JSBSim's integrator is
-    /// replaced by RK4.
+    /// `model` with the integrator that matches this flight's sampling. If rates are held, as a simulator logs them, the model
+    /// keeps its integrator. For samples at instants, JSBSim's integrator is replaced by RK4.
     pub fn stepping<'a>(&self, model: &'a GreyBox) -> Cow<'a, GreyBox> {
         match (self.sampling, model.integrator) {
             (Sampling::Instants, Integrator::Jsbsim) => {
@@ -166,9 +166,8 @@ impl Prepared {
         }
     }
 
-    /// State of `model` one sample after `state`. `model` must come from [`Self::stepping`].
-    ///
-    /// Deflections are held from sample `at`, or interpolated from `at` to the next sample `next` for samples at instants.
+    /// Integrates `model` from `state` over the time from the sample `at` to the sample `next`. `model` must come from
+    /// [`Self::stepping`]. The deflections are those of `at` or, for samples at instants, are interpolated from `at` to `next`.
     pub fn advance(
         &self,
         model: &GreyBox,
@@ -193,12 +192,12 @@ impl Prepared {
         &self.segments[window.segment][window.start..=window.start + self.kernel.steps()]
     }
 
-    /// Whether at least one window has specific force in all samples.
+    /// Whether in at least one window all samples have a specific force.
     pub fn has_force(&self) -> bool {
         self.windows.iter().any(|w| self.force_in(w))
     }
 
-    /// Whether a window has specific force in all samples.
+    /// Whether all samples of a window have a specific force.
     pub fn force_in(&self, window: &Window) -> bool {
         self.samples(window).iter().all(|i| i.specific_force.iter().all(|f| f.is_finite()))
     }
@@ -220,8 +219,8 @@ fn substeps(flight: &Reconstruction) -> Result<usize, ClockError> {
 
 /// Resamples a stretch from the interval `step_s` to the interval `dt` (s).
 ///
-/// Equal intervals leave the samples unchanged. If `dt` is n times `step_s`, every n-th sample is kept. In all other cases,
-/// states are interpolated linearly and deflections are held.
+/// If the intervals are equal, the samples stay as they are. If `dt` is n times `step_s`, every n-th sample is kept. In all
+/// other cases, states are interpolated linearly, and a deflection is that of the sample before.
 fn on_clock(instants: &[Instant], step_s: f64, dt: f64) -> Vec<Instant> {
     if (step_s / dt - 1.0).abs() < 1e-6 {
         return instants.to_vec();
@@ -239,9 +238,9 @@ fn on_clock(instants: &[Instant], step_s: f64, dt: f64) -> Vec<Instant> {
     (0..=count).map(at).collect()
 }
 
-/// Standard deviation of the white noise in a series, from third differences; infinite if there are none.
+/// Standard deviation of the white noise in a series, from third differences. It is infinite if there are none.
 ///
-/// Third differences of a smooth signal vanish. Those of white noise have 1 + 9 + 9 + 1 = 20 times its variance.
+/// Third differences of a smooth signal nearly vanish. Those of white noise have 1 + 9 + 9 + 1 = 20 times its variance.
 fn white_noise(segments: &[Vec<Instant>], of: &dyn Fn(&Instant) -> f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for four in segments.iter().flat_map(|s| s.windows(4)) {
@@ -257,7 +256,7 @@ fn white_noise(segments: &[Vec<Instant>], of: &dyn Fn(&Instant) -> f64) -> f64 {
 fn between(a: &Instant, b: &Instant, part: f64) -> Instant {
     let mix = |x: f64, y: f64| x + (y - x) * part;
     let (x, mut y) = (a.state.to_array(), b.state.to_array());
-    // interpolate roll along the smaller angle
+    // roll is interpolated over the smaller angle between the two values
     y[0] = x[0] + (y[0] - x[0] + PI).rem_euclid(TAU) - PI;
     Instant {
         time_s: mix(a.time_s, b.time_s),
@@ -295,7 +294,7 @@ fn windows(segments: &[Vec<Instant>], kernel: &Kernel, origin: f64) -> Vec<Windo
     windows
 }
 
-/// Regime variables of a window, averaged with the kernel.
+/// Regime variables of a window, averaged with the weights of the kernel.
 fn regime(
     samples: &[Instant],
     kernel: &Kernel,

@@ -1,6 +1,8 @@
-//! Channels in weak form: measured and predicted forces, moments and rates for each window.
+//! Channels in weak form: measured and predicted forces, moments and rates of states for each window.
 //!
-//! Measured data are never differentiated: see [`Kernel`]. Products of signals are formed before smoothing.
+//! A window is a short interval of samples. In weak form, both sides of an equation of motion are averaged over a window with a
+//! smooth weight (kernel). Measured data are never differentiated: see [`Kernel`]. Products of signals are formed before this
+//! smoothing.
 
 use rayon::prelude::*;
 
@@ -151,7 +153,7 @@ impl Step<'_> {
     }
 }
 
-/// Measured D less thrust, L and Y from the accelerometers, N.
+/// Measured D (less thrust), L and Y from the accelerometers, N.
 fn measured_force(model: &GreyBox, at: &Instant) -> Vector<f64> {
     let air = model.air(&at.state, at.altitude);
     let force = at.specific_force.map(|f| f * model.body.mass);
@@ -164,7 +166,7 @@ fn predicted_force(model: &GreyBox, at: &Instant) -> Vector<f64> {
     to_force_axes(rigid_body::body_force(&wrench, &air, model.axes), &air, model.axes)
 }
 
-/// Converts a force in body axes, N, to D less thrust, L and Y, N. The order is that of [`ChannelId::ALL`];
+/// Converts a force in body axes, N, to D (less thrust), L and Y, N. The order is that of [`ChannelId::ALL`], whereas
 /// [`rigid_body::aerodynamic_force`] has the order D, Y, L.
 pub(crate) fn to_force_axes<R: Real>(
     force: Vector<R>,
@@ -282,7 +284,7 @@ pub(crate) fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
     std::array::from_fn(|k| [force, moment, [rate.airspeed, rate.alpha, rate.beta]][k / 3][k % 3])
 }
 
-/// Linear part of a model in weak form: contribution of each coefficient per unit of the coefficient.
+/// Linear part of a model in weak form: the contribution of each coefficient per unit of the coefficient.
 #[derive(Clone, Debug)]
 pub struct Columns {
     /// Names of the coefficients, as in the model.

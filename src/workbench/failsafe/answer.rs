@@ -1,4 +1,5 @@
-//! Result of a failsafe flight as HTML: verdict, time lines, texts, rules, and the command for the scenario.
+//! Result of a failsafe flight as HTML: verdict, time lines, texts, rules, and the command for the scenario. In a failsafe
+//! flight, a simulated vehicle, companion and client meet the faults of a scenario. The rules are requirements on the flight.
 
 use super::Flown;
 use super::verdict::Happened;
@@ -9,10 +10,10 @@ use greylag_sim::faults::policies::Policy;
 /// Name of the scenario file in the command.
 const FILE: &str = "scenario.json";
 
-/// Distance from which a rule counts as far from being broken; the largest distance is 1.
+/// A rule whose distance from being broken is at least this counts as far from broken. The largest distance is 1.
 const FAR: f64 = 0.9995;
 
-/// The result of a flight as HTML.
+/// The result of the flight `flown` as HTML.
 pub(super) fn html(flown: &Flown) -> String {
     let close_up = flown.close_up().as_ref().map_or_else(String::new, TimeLine::html);
     format!(
@@ -48,7 +49,7 @@ fn events(flown: &Flown) -> String {
     )
 }
 
-/// The applicable rules with their smallest distances, in order of increasing distance.
+/// The applicable rules with their smallest distances, in order of increasing distance, as HTML.
 fn rules(flown: &Flown) -> String {
     let judged = flown.rules.iter().zip(&flown.judged);
     let mut judged: Vec<(&Policy, f64, f64)> =
@@ -86,7 +87,7 @@ pub(super) fn command(controller: ControllerKind) -> String {
     format!("greylag faults --controller {} --scenario {FILE}", controller.name())
 }
 
-/// The content of the scenario file, and the command that repeats the flight.
+/// The content of the scenario file and the command that repeats the flight, as HTML.
 fn again(flown: &Flown) -> String {
     // serialisation of numbers and names does not fail
     let json = serde_json::to_string_pretty(&flown.scenario).unwrap_or_default();

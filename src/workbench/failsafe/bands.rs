@@ -1,4 +1,5 @@
-//! Time lines of a failsafe flight: bands of states, and curves.
+//! Time lines of a simulated flight in which failsafes are tried. Bands show the modes of the companion and the flight
+//! controller, curves show the motion. The companion is Greylag's autopilot.
 
 use super::Flown;
 use super::choices::{fault, request};
@@ -16,7 +17,7 @@ const STALE_S: f64 = 0.2;
 /// Displayed length of an instantaneous event, such as a request, s.
 const MOMENT_S: f64 = 0.1;
 
-/// Name and kind of a state at a step; `None` without a state.
+/// Name of the state that a band shows at a step, and its kind, which sets the colour. `None` leaves a gap in the band.
 type Seen = Option<(String, Tone)>;
 
 impl Flown {
@@ -122,7 +123,7 @@ impl Flown {
     }
 }
 
-/// Joins equal states of consecutive samples to spans. A sample without a state leaves a gap.
+/// Joins the equal states of consecutive samples to spans of a band. A sample without a state leaves a gap.
 pub(super) fn spans(samples: &[Sample], of: impl Fn(&Sample) -> Seen) -> Vec<Span> {
     let mut spans: Vec<Span> = Vec::new();
     for (k, sample) in samples.iter().enumerate() {

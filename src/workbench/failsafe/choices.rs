@@ -1,11 +1,14 @@
 //! Options of the failsafe form with their texts: counterparts, controllers, faults, requests.
+//!
+//! The form flies the companion (Greylag's autopilot) in simulation under faults. A counterpart is the vehicle at the other end
+//! of its link: the simulator, PX4 or ArduPilot.
 
 use greylag_control::{ControllerKind, Pace};
 use greylag_sim::faults::{Asking, Counterpart, FaultKind};
 
-/// Value for no fault or no request.
+/// Form value for no fault or no request.
 pub(super) const NOTHING: &str = "none";
-/// Value for the request in which the client arms and requests OFFBOARD again.
+/// Form value for the request in which the client arms and requests OFFBOARD again.
 pub(super) const AGAIN: &str = "again";
 /// Requests of the client: form value and displayed text.
 pub(super) const REQUESTS: [(&str, &str); 7] = [
@@ -21,8 +24,8 @@ pub(super) const REQUESTS: [(&str, &str); 7] = [
 pub(super) const TURBULENCE: [(&str, &str); 4] =
     [("0", "none"), ("3", "light"), ("4", "moderate"), ("6", "severe")];
 
-/// Controllers that compute a command within one control step. A flight with a planner takes seconds of computation and is
-/// available in `greylag faults`.
+/// Controllers that compute a command within one control step. A flight with a planner takes seconds of computation; `greylag
+/// faults` offers it.
 pub(super) fn controllers() -> impl Iterator<Item = ControllerKind> {
     ControllerKind::ALL.iter().copied().filter(|kind| kind.pace() == Pace::Immediate)
 }
@@ -38,7 +41,7 @@ pub(super) fn counterpart(counterpart: Counterpart) -> &'static str {
     }
 }
 
-/// Faults in the form, the most common ones first.
+/// Faults in the form, in their order of display: the most common ones first.
 pub(super) const FAULTS: [FaultKind; 18] = [
     FaultKind::Unplug,
     FaultKind::Corruption,
@@ -60,7 +63,7 @@ pub(super) const FAULTS: [FaultKind; 18] = [
     FaultKind::Disk,
 ];
 
-/// Name of a fault, and the range of its effect from a strength of 0 to 100 %.
+/// Displayed name of a fault, and the text on its effect over the range of strengths from 0 to 100 %.
 pub(super) fn fault(kind: FaultKind) -> (&'static str, &'static str) {
     match kind {
         FaultKind::Unplug => ("Link cut", "Nothing passes between companion and vehicle."),
@@ -99,7 +102,7 @@ pub(super) fn fault(kind: FaultKind) -> (&'static str, &'static str) {
     }
 }
 
-/// Text of a request for the list of events.
+/// Text of a request in the list of events.
 pub(super) fn request(asking: Asking) -> &'static str {
     match asking {
         Asking::Offboard => "client asks for OFFBOARD",

@@ -1,4 +1,5 @@
-//! The form of the failsafe page, and the scenario that it describes.
+//! The form of the failsafe page, and the scenario that it describes. A scenario is a simulated flight with a fault and a client
+//! that sends requests.
 
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -11,7 +12,7 @@ use greylag_sim::faults::{
 
 /// Duration of a flight, s.
 pub(super) const FLIGHT_S: f64 = 60.0;
-/// Start and end of the commanded attitude, s; before and after, the command is level flight.
+/// Start and end of the attitude that the form commands, s. Before and after it, level flight is commanded.
 const ATTITUDE_S: [f64; 2] = [8.0, 45.0];
 /// Pitch command in level flight, °.
 const LEVEL_DEG: f64 = 3.0;
@@ -22,7 +23,8 @@ const AFTER_ARMING_S: f64 = 0.1;
 /// Largest seed that the form accepts.
 const SEED: u64 = 999_999;
 
-/// Fields and their default values: a link interruption in a turn, and a client that repeats its request later.
+/// Names of the fields with their default values. The default is a link interruption in a turn, after which the client requests
+/// arming and OFFBOARD again.
 pub(super) const FIELDS: [(&str, &str); 16] = [
     ("counterpart", "px4"),
     ("radio", "no"),
@@ -42,7 +44,7 @@ pub(super) const FIELDS: [(&str, &str); 16] = [
     ("seed", "1"),
 ];
 
-/// A numeric field: name, meaning, limits and unit.
+/// A numeric field: its name, meaning, limits and unit.
 pub(super) struct Number {
     pub field: &'static str,
     pub what: &'static str,
@@ -59,7 +61,7 @@ const fn number(
     Number { field, what, limits, unit }
 }
 
-/// The numeric fields.
+/// The numeric fields of the form.
 pub(super) const NUMBERS: [Number; 9] = [
     number("from_s", "the fault's beginning", [1.0, 55.0], "s"),
     number("for_s", "the fault's length", [0.02, 40.0], "s"),
@@ -78,7 +80,7 @@ pub(super) struct Form {
     values: Vec<(&'static str, String)>,
 }
 
-/// An invalid value.
+/// Error about an invalid value.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{why}")]
 pub(super) struct Wrong {
@@ -88,7 +90,7 @@ pub(super) struct Wrong {
     pub why: String,
 }
 
-/// A scenario and the controller for it.
+/// A scenario and the controller that flies it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Chosen {
     pub scenario: Scenario,
@@ -96,7 +98,8 @@ pub(super) struct Chosen {
 }
 
 impl Form {
-    /// The form with the values of a query and defaults for other fields, and the error of the first unknown field name.
+    /// Makes a form from the values of a query, with defaults for the other fields. Also returns an error about the first
+    /// unknown field name, if there is one.
     pub fn of(query: &[(String, String)]) -> (Form, Option<Wrong>) {
         let value = |(field, default): (&'static str, &str)| {
             let given = query.iter().rev().find(|(name, _)| name == field);
@@ -116,7 +119,7 @@ impl Form {
         self.values.iter().find(|(name, _)| *name == field).map_or("", |(_, value)| value)
     }
 
-    /// The scenario and the controller that the form describes.
+    /// Returns the scenario and the controller that the form describes.
     ///
     /// # Errors
     /// `Wrong` for the first invalid value.
@@ -155,7 +158,7 @@ impl Form {
         })
     }
 
-    /// Parameter of the flight controller that binds a radio; empty without a radio.
+    /// Parameter by which the simulated flight controller has a bound radio; empty without a radio.
     fn radio(&self, counterpart: Counterpart) -> Result<Vec<ControllerSetting>, Wrong> {
         match (self.value("radio"), counterpart.stack()) {
             ("no", _) => Ok(Vec::new()),
@@ -183,7 +186,7 @@ impl Form {
         let from_s = self.number("from_s")?;
         let length = if kind.has_length() { self.number("for_s")? } else { FLIGHT_S - from_s };
         let strength = if kind.has_strength() { self.number("strength")? / 100.0 } else { 0.5 };
-        // a clock jump happens once, at its beginning
+        // a clock jump has no duration
         let length = if kind == FaultKind::Clock { 0.01 } else { length };
         let to_s = (from_s + length).min(FLIGHT_S);
         Ok(Some(Fault { kind, from_s, to_s, strength }))
@@ -217,7 +220,7 @@ impl Form {
         Ok(asked)
     }
 
-    /// Legs of the flight: level, the commanded attitude, level.
+    /// Legs of the flight: level flight, the attitude of the form, level flight.
     fn legs(&self) -> Result<Vec<Leg>, Wrong> {
         let [roll_deg, pitch_deg] = [self.number("roll_deg")?, self.number("pitch_deg")?];
         let leg = |from_s, roll_deg, pitch_deg| Leg { from_s, roll_deg, pitch_deg };
@@ -225,7 +228,7 @@ impl Form {
         Ok(vec![leg(0.0, 0.0, LEVEL_DEG), leg(from, roll_deg, pitch_deg), leg(to, 0.0, LEVEL_DEG)])
     }
 
-    /// The value of a field, which must be a name of the type `T`.
+    /// Converts the value of a field to the type `T`, in which it must be a name.
     fn named<T: DeserializeOwned>(&self, field: &'static str, what: &str) -> Result<T, Wrong> {
         let value = Value::String(self.value(field).to_owned());
         serde_json::from_value(value).map_err(|e| {
@@ -257,12 +260,12 @@ impl Form {
     }
 }
 
-/// ArduPilot parameter for a bound radio with released sticks.
+/// ArduPilot parameter for a bound radio whose sticks are released.
 fn bound_radio() -> ControllerSetting {
     ControllerSetting { name: "SIM_RC_FAIL".into(), value: 0.0 }
 }
 
-/// Wind vector, north-east-down, m/s, from the speed, m/s, and the direction from which the wind blows, ° from north.
+/// Wind vector (north-east-down, m/s) for a wind of `speed_mps` (m/s) from the direction `from_deg` (° from north).
 fn wind(speed_mps: f64, from_deg: f64) -> [f64; 3] {
     let (sin, cos) = from_deg.to_radians().sin_cos();
     // rounded to 1 mm/s, without −0, which would appear in the file
@@ -379,12 +382,12 @@ mod tests {
             let wrong = chosen(&[(field, value)]).unwrap_err();
             assert!(wrong.field == field && wrong.why.contains(why), "{field}: {wrong}");
         }
-        // a link interruption has no strength, but frame loss has
+        // a link interruption has no strength, but frame loss has one
         let wrong = chosen(&[("fault", "loss"), ("strength", "101")]).unwrap_err();
         assert!(wrong.why.contains("from 0 to 100 %"), "{wrong}");
         let wrong = chosen(&[("colour", "red")]).unwrap_err();
         assert!(wrong.why.contains("no choice \"colour\"") && wrong.why.contains("counterpart"));
-        // the simulator has no flight controller from which a ground station can take over
+        // without a flight controller, a ground station cannot take over
         let station = [("counterpart", "sitl"), ("request", "take-over")];
         assert!(chosen(&station).unwrap_err().why.contains("choose PX4 or ArduPilot"));
         // unused fields are not checked

@@ -25,7 +25,7 @@ const EXAMPLES: [(&str, &str); 8] = [
     ("Disarm in the air", "counterpart=sitl&fault=none&request=disarm"),
 ];
 
-/// The page with the values of `form` and the result `shown`; an invalid field is marked.
+/// The page with the values of `form` and the HTML `shown` of the result. The field that `wrong` names is marked as invalid.
 pub(super) fn render(form: &Form, wrong: Option<&Wrong>, shown: &str) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\

@@ -1,4 +1,5 @@
-//! Events of a failsafe flight in time order, and the verdict in words.
+//! The events of a simulated failsafe flight in time order, and the verdict in words. In such a flight the user causes faults
+//! while the companion (this program's autopilot) controls the aircraft, in most cases through a flight controller.
 
 use super::Flown;
 use super::bands::{companion, spans};
@@ -10,14 +11,14 @@ use greylag_report::{Span, Tone};
 use greylag_sim::faults::policies::Sample;
 use greylag_sim::faults::{Asking, Fault, Finding, Found};
 
-/// Largest number of changes in a sentence.
+/// Largest number of changes that a sentence names.
 const NAMED: usize = 4;
 /// Longest time between arming and the request for OFFBOARD at which both count as one request, s.
 const TOGETHER_S: f64 = 0.2;
-/// Time after a cause at which its effect is evaluated, s.
+/// Time (s) after a fault or request at which its consequence is evaluated.
 const LATER_S: f64 = 2.0;
 
-/// Smallest loss of altitude that the verdict mentions, m.
+/// Loss of altitude (m) from which on the verdict mentions it.
 const MUCH_M: f64 = 30.0;
 
 /// A fault or request that can cause later changes.
@@ -43,9 +44,9 @@ pub(super) enum Who {
     Fault,
     /// The client or a ground station.
     Client,
-    /// The companion.
+    /// The companion, this program's autopilot.
     Companion,
-    /// The flight controller.
+    /// The flight controller between companion and aircraft.
     Controller,
 }
 
@@ -62,7 +63,7 @@ impl Who {
 }
 
 impl Flown {
-    /// All events and texts of the flight, in time order.
+    /// All events of the flight and all texts that the companion sent, in time order.
     pub(super) fn events(&self) -> Vec<Happened> {
         let mut all = self.befallen();
         let said = |(at_s, words): &(f64, String)| Happened {
@@ -80,7 +81,7 @@ impl Flown {
         all
     }
 
-    /// Faults, and requests with their answers.
+    /// The faults, and the requests with the companion's answers.
     fn befallen(&self) -> Vec<Happened> {
         let happened = |at_s, who, what| Happened { at_s, who, what };
         let mut all = Vec::new();
@@ -102,7 +103,7 @@ impl Flown {
         all
     }
 
-    /// The consecutive modes of the flight controller.
+    /// The successive modes of the flight controller, with their times.
     fn modes(&self) -> Vec<Span> {
         let counterpart = self.scenario.counterpart;
         spans(&self.witnessed.samples, |s| {
@@ -111,7 +112,7 @@ impl Flown {
         })
     }
 
-    /// Changes in time order: time, s, and text.
+    /// All changes that [`change`](Self::change) finds in the flight, as time (s) and text, in time order.
     fn deeds(&self) -> Vec<(f64, String)> {
         let mut all: Vec<(f64, String)> = Vec::new();
         for (k, pair) in self.witnessed.samples.windows(2).enumerate() {
@@ -122,7 +123,8 @@ impl Flown {
         all
     }
 
-    /// Changes between two consecutive samples: of the companion, and of its flight controller.
+    /// Texts on what changed between two consecutive samples: the companion's mode or control authority, and the mode of the
+    /// flight controller.
     fn change(&self, before: &Sample, now: &Sample) -> [Option<String>; 2] {
         let counterpart = self.scenario.counterpart;
         let companion = match (before.shown, now.shown) {
@@ -144,7 +146,8 @@ impl Flown {
         [companion, controller]
     }
 
-    /// The verdict: one sentence for each cause with its consequences, then sentences on the end of the flight and on the rules.
+    /// The verdict: one sentence for each fault or request with its consequences, then sentences on the end of the flight and on
+    /// the rules of flight.
     pub(super) fn sentence(&self) -> String {
         let causes = self.causes();
         let deeds = self.deeds();
@@ -169,7 +172,7 @@ impl Flown {
         format!("{text}{}{} {}", self.end(), self.lost(), self.rules_in_words())
     }
 
-    /// Faults and requests in time order.
+    /// The faults and requests, in time order.
     fn causes(&self) -> Vec<Cause> {
         let of_fault = |f: &Fault| {
             let (name, from, to) = (fault(f.kind).0, f.from_s, f.to_s);
@@ -199,7 +202,7 @@ impl Flown {
         all
     }
 
-    /// Text for a cause without a change of control.
+    /// Text on a fault or request after which no change occurred.
     fn nothing_changed(&self, cause: &Cause) -> String {
         match cause.asked.map(|(at_s, what)| self.answer(at_s, what)) {
             Some(Some(Verdict::Rejected(why) | Verdict::Denied(why))) => return why.clone(),
@@ -214,13 +217,13 @@ impl Flown {
         }
     }
 
-    /// The sample at which the effect of a cause is evaluated.
+    /// The sample at which the consequence of `cause` is evaluated.
     fn later(&self, cause: &Cause) -> Option<&Sample> {
         let samples = &self.witnessed.samples;
         samples.get(((cause.at_s + LATER_S) / TICK_S) as usize).or(samples.last())
     }
 
-    /// Text for an aircraft that nobody controls after a cause; `None` if somebody controls it.
+    /// Text on an aircraft that nobody controls after `cause`; `None` if somebody controls it.
     fn left_alone(&self, cause: &Cause) -> Option<String> {
         let later = self.later(cause).filter(|s| s.shown.is_none() && s.steered)?;
         let counterpart = self.scenario.counterpart;
@@ -232,14 +235,14 @@ impl Flown {
         })
     }
 
-    /// The companion's answer to a request; `None` without an answer.
+    /// The companion's answer to the request `asked` at the time `asked_s` (s); `None` without an answer.
     fn answer(&self, asked_s: f64, asked: Asking) -> Option<&Verdict> {
         let mut answers = self.witnessed.answers.iter();
         let near = |at_s: f64| (at_s - asked_s).abs() < 2.0 * TICK_S;
         answers.find(|(at_s, what, _)| *what == asked && near(*at_s)).map(|(.., verdict)| verdict)
     }
 
-    /// Sentence on the end of the flight.
+    /// A sentence on how the flight ended.
     fn end(&self) -> String {
         let Some(last) = self.witnessed.samples.last() else { return String::new() };
         let found = |finding| self.witnessed.findings.iter().find(|f| f.finding == finding);
@@ -265,13 +268,13 @@ impl Flown {
         }
     }
 
-    /// Sentence on the loss of altitude; empty if the loss is below `MUCH_M`.
+    /// A sentence on the loss of altitude; empty if the loss is below `MUCH_M`.
     fn lost(&self) -> String {
         let lost = self.witnessed.samples.iter().map(|s| s.lost_m).fold(0.0, f64::max);
         if lost < MUCH_M { String::new() } else { format!(" The aircraft lost {lost:.0} m.") }
     }
 
-    /// Sentence on the rules of flight: either all hold, or which are broken.
+    /// A sentence on the rules of flight, requirements on the companion. It states that all hold, or which are broken.
     fn rules_in_words(&self) -> String {
         let judged = self.judged.iter().zip(&self.rules);
         let judged: Vec<_> =
@@ -284,8 +287,8 @@ impl Flown {
         }
     }
 
-    /// CSS class of the verdict: "unexplained" if a rule is broken or the aircraft is lost, "open" if nobody controlled the
-    /// aircraft, otherwise "effect".
+    /// CSS class of the verdict. It is "unexplained" if a rule is broken, the aircraft is lost or the program panicked, "open" if
+    /// nobody controlled the aircraft after a fault or request, and otherwise "effect".
     pub(super) fn standing(&self) -> &'static str {
         let bad = |f: &Found| matches!(f.finding, Finding::Crash | Finding::Panic);
         let broken = self.judged.iter().flatten().any(|(distance, _)| *distance < 0.0);

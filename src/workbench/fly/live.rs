@@ -1,4 +1,7 @@
-//! A flight in progress: measured and predicted values, with the bands of the models' monitors.
+//! A flight in progress: measured values, and the predictions of models with the bands of their monitors.
+//!
+//! A monitor compares measured accelerations (the channels) with a model's predictions. A point is the mean over 0.1 s of
+//! flight.
 
 use std::collections::BTreeMap;
 
@@ -11,12 +14,12 @@ use greylag_logs::Sample;
 use greylag_model::GreyBox;
 use greylag_physics::{ActuatorState, State, Time};
 
-/// Time between two points, s; the rows in between are averaged.
+/// Duration of a point, s.
 const STEP_S: f64 = 0.1;
 /// Largest number of points: ten minutes of flight.
 const MOST: usize = 6000;
 
-/// Values at the points; `None` if there is no measurement.
+/// Values of one quantity at the points; `None` if there is no measurement.
 type Column = Vec<Option<f32>>;
 
 /// A flight or a part of it, as data for the plots of a page.
@@ -107,12 +110,12 @@ impl Mean {
     }
 }
 
-/// A point that still receives samples.
+/// A point that is not complete: further samples are added to it.
 struct Point {
     place: i64,
     states: [Mean; STATES.len()],
     measured: [Mean; 6],
-    /// By model and channel: predicted value, half width of the band, share.
+    /// Mean values by model and channel: prediction, half width of the band, and the residual divided by this half width.
     models: Vec<[[Mean; 3]; 6]>,
 }
 
@@ -156,7 +159,7 @@ impl Watcher {
         live
     }
 
-    /// Completes and returns the last point, at the end of the flight.
+    /// Completes and returns the last point. It is called at the end of the flight.
     pub fn rest(&mut self) -> Live {
         let mut live = self.empty();
         self.finish(&mut live);
@@ -200,7 +203,8 @@ impl Point {
 }
 
 impl Live {
-    /// Appends a later part; returns the number of oldest points that were removed.
+    /// Appends a later part of the flight. Returns the number of oldest points that were removed to keep the largest number of
+    /// points.
     pub fn append(&mut self, later: Live) -> usize {
         self.time_s.extend(later.time_s);
         for (name, column) in later.states {
@@ -238,8 +242,8 @@ impl Watched {
     }
 }
 
-/// Converts a row for the monitor. A missing value becomes a fault of the frame, and the monitor does not compare the affected
-/// channels.
+/// Converts a row of the log for the monitor. A missing value becomes a fault of the frame. The monitor does not compare the
+/// channels that a fault affects.
 fn frame(row: &Sample) -> Telemetry {
     let [roll, pitch, yaw] = row.attitude_rad;
     let [p, q, r] = row.rates_radps;

@@ -1,5 +1,5 @@
-//! Flights in the simulator with the session's model, and recordings that other programs write. During the flight, the page
-//! compares the measured channels with the models' predictions.
+//! Flights in the workbench: flights in the simulator with the session's model, and recordings that another program is writing.
+//! During a flight, the page compares the measured channels with the predictions of the models.
 
 mod live;
 mod order;
@@ -28,26 +28,26 @@ use greylag_model::GreyBox;
 use live::Watcher;
 use program::Program;
 
-/// Subfolder of the session's folder for recordings.
+/// Subfolder of the session's folder for the recordings of simulator flights.
 const FLIGHTS: &str = "flights";
 /// File name of a recording's log.
 const LOG: &str = "flight.csv";
-/// Interval between reads of the recording.
+/// Interval between two reads of a growing recording.
 const LOOK: Duration = Duration::from_millis(100);
-/// Largest number of characters kept of a program's last line.
+/// Largest number of characters that are kept of the last line that a program printed.
 const LINE_LENGTH: usize = 400;
 
-/// The present flight, simulated or recorded by another program, or else the last flight.
+/// The present flight, or the last one if none is in progress. It is simulated, or recorded by another program.
 pub struct Flying {
-    /// Number of the flight, which is also the name of its folder.
+    /// Number by which the pages identify the flight. Jobs and flights share one sequence of numbers.
     pub number: u64,
     /// Index of the flight in the session's list of flights.
     pub place: usize,
     /// Whether the flight is in progress.
     pub on: bool,
-    /// Samples, predictions and warnings so far.
+    /// Samples, predictions and warnings of the flight so far.
     pub live: Live,
-    /// Number of points removed from the start of `live`, whose length is limited.
+    /// Number of points that were removed from the start of `live`, because its length is limited.
     pub gone: usize,
     stop: Stop,
 }
@@ -59,7 +59,7 @@ pub struct Part {
     pub number: u64,
     /// Whether the flight is in progress.
     pub on: bool,
-    /// Number of points of the flight before this part.
+    /// Number of points of the flight that precede this part.
     pub from: usize,
     /// Samples, predictions and warnings of the part.
     pub live: Live,
@@ -75,7 +75,8 @@ struct Task {
 }
 
 impl Bench {
-    /// Starts a simulator flight with the amended model, or with the given model if no fit is complete.
+    /// Starts a flight in the simulator. It is flown with the amended model if its fit is complete and has an accepted effect,
+    /// otherwise with the given model.
     pub(super) fn fly(self: &Arc<Self>, seen: u64, order: &Order) -> Result<(), WorkbenchError> {
         if !cfg!(feature = "sitl") {
             return Err(WorkbenchError::NoSimulator);
@@ -101,7 +102,7 @@ impl Bench {
         self.begin(seen, begun, || Program::start(&words).map(Some).map_err(|e| io(&record, e)))
     }
 
-    /// Displays the recording in `folder` while another program writes it.
+    /// Displays the recording in `folder` while another program writes it. `folder` may also be the path of the log.
     pub(super) fn watch(self: &Arc<Self>, seen: u64, folder: &Path) -> Result<(), WorkbenchError> {
         let folder = match folder.file_name() {
             Some(name) if name == LOG => folder.parent().unwrap_or(folder),
@@ -153,7 +154,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Stops the flight, or the display of a recording.
+    /// Stops the simulated flight, or the display of a recording.
     pub(super) fn stop_flight(&self) -> Result<(), WorkbenchError> {
         let inner = self.lock();
         let flying = inner.flying.as_ref().filter(|f| f.on);
@@ -174,7 +175,7 @@ impl Bench {
             (self.folder.join(&flown.folder).join(LOG), format!("flown-{name}.csv"))
         };
         let bytes = std::fs::read(&file).map_err(|e| io(&file, e))?;
-        // results depend only on flights with a role, so they stay valid until this flight gets a role
+        // the log is added as unused: it then changes no result until the user gives it a role
         self.take_as(seen, &name, &bytes, Some(Role::Unused))
     }
 
@@ -185,14 +186,14 @@ impl Bench {
         Some(Part { number: *number, on: *on, from: *gone, live: live.clone() })
     }
 
-    /// Follows the recording until its end.
+    /// Reads the recording until the flight ends or is stopped, and then stores the outcome.
     fn follow(self: &Arc<Self>, mut task: Task) {
         let mut watcher = Watcher::new(&task.models);
         let mut tail = Tail::default();
         let mut trouble = None;
         let outcome = loop {
             let stopped = task.stop.answer().is_break();
-            // checked before the last rows are read, because rows written in between must be read
+            // this is checked before rows are read, so that no rows are missed that the program writes before it ends
             let ended = match &mut task.program {
                 Some(program) => {
                     if stopped {
@@ -220,7 +221,7 @@ impl Bench {
         self.record_end(task.number, outcome, &last, tail.seconds());
     }
 
-    /// Stores a part of the flight and sends it to the pages.
+    /// Stores the new part `later` of the flight and sends it to the pages.
     fn seen(&self, number: u64, later: Live) {
         if later.time_s.is_empty() && later.warnings.is_empty() {
             return;
@@ -278,7 +279,7 @@ fn free(folder: &Path) -> u64 {
     numbers.max().unwrap_or(0) + 1
 }
 
-/// State of reading a growing recording.
+/// State of the reader of a growing recording.
 #[derive(Default)]
 struct Tail {
     growing: Growing,

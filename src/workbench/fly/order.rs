@@ -90,7 +90,8 @@ pub fn controllers() -> impl Iterator<Item = &'static str> {
 
 impl Order {
     /// Arguments of the command that executes the order with the model file `model` and records to `record`. If the schedule is a
-    /// manoeuvre of the list, its file is first written below the session's folder `folder`, for the cruise airspeed `cruise_mps`.
+    /// manoeuvre of the list, its file is first written below the session's folder `folder`, for the cruise airspeed
+    /// `cruise_mps`.
     ///
     /// # Errors
     /// `WorkbenchError::Order` if an option is unknown, and an error if the schedule cannot be written.

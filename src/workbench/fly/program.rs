@@ -1,4 +1,4 @@
-//! The process of a simulator flight: this program with the command `greylag demo`.
+//! The process of a flight in the simulator. It runs this program with the command `greylag demo`.
 
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};

@@ -1,4 +1,4 @@
-//! Files of the page, which are embedded in the program.
+//! The page of the workbench and its files, which are embedded in the program.
 
 use axum::extract::Path;
 use axum::http::header::CONTENT_TYPE;
@@ -7,7 +7,7 @@ use axum::response::{Html, IntoResponse, Response};
 use super::routes;
 
 const PAGE: &str = include_str!("../assets/page.html");
-/// Name, media type and content of each file.
+/// Name, media type and content of each file that the page loads.
 const FILES: [(&str, &str, &str); 13] = [
     ("workbench.css", CSS, include_str!("../assets/workbench.css")),
     ("uplot.css", CSS, include_str!("../../report/kit/assets/uPlot.min.css")),
@@ -31,7 +31,7 @@ pub async fn page() -> Html<&'static str> {
     Html(PAGE)
 }
 
-/// The file `name` of the page; status 404 if it does not exist.
+/// The file `name` of the page, or the status 404 if there is no such file.
 pub async fn asset(Path(name): Path<String>) -> Response {
     match FILES.iter().find(|(own, ..)| *own == name) {
         Some((_, kind, text)) => ([(CONTENT_TYPE, *kind)], *text).into_response(),
@@ -43,7 +43,7 @@ pub async fn asset(Path(name): Path<String>) -> Response {
 mod tests {
     use super::*;
 
-    /// The limit for the page without data is 300 kB.
+    /// The page without data must stay below 300 kB.
     #[test]
     fn the_page_is_light_and_names_only_its_own_files() {
         let weight: usize = PAGE.len() + FILES.iter().map(|(.., text)| text.len()).sum::<usize>();

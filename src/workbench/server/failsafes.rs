@@ -1,11 +1,11 @@
-//! Handler of the page on failsafes.
+//! HTTP handler of the page about failsafes, which simulates flights with faults.
 
 use axum::extract::{Query, State};
 use axum::response::Response;
 
 use super::Shared;
 
-/// The page for the form values in the address. An invalid value gives status 422.
+/// The page for the form values in the query of the address. An invalid value gives status 422.
 #[cfg(feature = "sitl")]
 pub async fn page(
     State(shared): State<Shared>,

@@ -1,4 +1,5 @@
-//! Access control: allows only pages of this program on this computer, identified by a token.
+//! Access control. A request must have the token of this program, and its headers must not name a foreign host or page. A
+//! request without an `Origin` header (from a program such as curl) is allowed too if it has the token.
 
 use axum::extract::{Request, State};
 use axum::http::header::{
@@ -16,7 +17,7 @@ use super::routes::failure;
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; \
                       img-src 'self' data:; base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
 
-/// Forwards a request that has the token and comes from a page of this program.
+/// Forwards a request that has the token and whose `Host` and, if present, `Origin` are this program's address. Refuses others.
 pub async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Response {
     let answer = match allowed(&shared, &request) {
         Ok(Entry::Known) => next.run(request).await,
@@ -30,11 +31,11 @@ pub async fn guard(State(shared): State<Shared>, request: Request, next: Next) -
     safe(answer)
 }
 
-/// How the request contains the token.
+/// Place of the token in an allowed request.
 enum Entry {
-    /// In the cookie or in a header.
+    /// The token is in the cookie or in a header.
     Known,
-    /// In the address; the answer sets this cookie.
+    /// The token is in the address. The answer sets this cookie.
     New(String),
 }
 
@@ -43,7 +44,7 @@ fn allowed(shared: &Shared, request: &Request) -> Result<Entry, Box<Response>> {
     let port = shared.address.port();
     let hosts = [format!("127.0.0.1:{port}"), format!("localhost:{port}")];
     let text = |name| headers.get(name).and_then(|v: &HeaderValue| v.to_str().ok());
-    // refuses a foreign host name that resolves to this computer, and requests from a page of another site
+    // this refuses a foreign host name that resolves to this computer, and requests from a page of another site
     let host = text(HOST).is_some_and(|h| hosts.iter().any(|own| own == h));
     let origin = text(ORIGIN).is_none_or(|o| hosts.iter().any(|own| o == format!("http://{own}")));
     if !host || !origin {

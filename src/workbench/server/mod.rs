@@ -1,4 +1,5 @@
-//! HTTP server of the workbench: on the loopback interface, with a token, without external files.
+//! HTTP server of the workbench. It listens on the loopback interface only, requires a token, and its pages load no external
+//! files.
 
 mod assets;
 mod failsafes;
@@ -18,14 +19,14 @@ use super::bench::{Bench, Given};
 use super::error::WorkbenchError;
 use super::jobs::Event;
 
-/// Largest log in an upload, bytes.
+/// Largest size of an uploaded log, bytes.
 pub const LARGEST_LOG: usize = 256 << 20;
 /// Largest body of any other request, bytes.
 const LARGEST_REQUEST: usize = 64 << 10;
-/// Number of events by which a slow page may lag.
+/// Number of events by which a slow page may lag behind. Older events are dropped.
 const LAG: usize = 256;
 
-/// Why the workbench cannot be served.
+/// Reason why the workbench cannot be served.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
     /// The session cannot be opened.
@@ -36,7 +37,7 @@ pub enum ServeError {
         "cannot serve the workbench on 127.0.0.1 port {port}: {source}; give another --port, or 0 for any"
     )]
     Socket {
-        /// The requested port.
+        /// The port that was requested.
         port: u16,
         /// Error of the operating system.
         source: io::Error,
@@ -53,7 +54,7 @@ struct Shared {
 }
 
 /// Serves the session of `given` on `port` of this computer (0 for any free port) until the program ends. Requests need `token`.
-/// When the server listens, it calls `ready` with the address of the page.
+/// `ready` is called with the address of the page when the server listens.
 ///
 /// # Errors
 /// `ServeError::Bench` if the session cannot be opened, and `ServeError::Socket` if the port cannot be used.
@@ -73,7 +74,7 @@ pub fn serve(
         let shout = events.clone();
         let on_event = move |event: Event| {
             if let Ok(text) = serde_json::to_string(&event) {
-                // without an open page, the channel has no receiver
+                // sending fails if no page is open, because the channel then has no receiver
                 let _ = shout.send(text.into());
             }
         };

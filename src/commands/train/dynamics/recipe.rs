@@ -1,11 +1,11 @@
-//! The recipe (all settings) of a training, from the options of the command.
+//! All settings (the recipe) of the training of a dynamics model, from the options of the command.
 
 use super::{Arguments, Joint};
 use crate::learn::{Criterion, Recipe, Start, trainable};
 use crate::model::{GreyBox, STEP};
 
-/// Steps of a rollout on logs whose sample time exceeds the model's time step. These logs are interpolated between their
-/// samples, and short rollouts would learn the interpolation.
+/// Number of model steps in a training rollout (a simulation from a measured state) if a log's sample time exceeds the model's
+/// time step. Such logs are interpolated between their samples, and training on short rollouts would fit the interpolation.
 const SLOW_STEPS: usize = 200;
 
 impl Arguments {

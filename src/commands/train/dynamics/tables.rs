@@ -1,4 +1,4 @@
-//! The lines and tables that a training of the dynamics prints.
+//! Progress line and tables of results that `greylag train dynamics` prints.
 
 use comfy_table::Table;
 
@@ -21,7 +21,8 @@ pub(super) fn line(p: &Progress, trainer: &Trainer, ms: f64) -> String {
     text
 }
 
-/// Contribution of the residual, channel by channel.
+/// Table of the state rates, one row each: RMS of the prior's rate and of the learned residual's rate, and the flight
+/// condition in which the residual is strongest.
 pub(super) fn shares(residual_map: &ResidualMap) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);

@@ -1,4 +1,4 @@
-//! Environment in which a policy is trained and evaluated: a model or JSBSim.
+//! The environment in which a policy is trained and evaluated: a model of the aircraft, or JSBSim.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::sim::evaluation::{Evaluation, Make, imagine};
 use crate::sim::targets::Row;
 use crate::sim::{Group, Outcome, TargetFile};
 
-/// The checked environment in which a policy is trained: `model`, or JSBSim if it is `None`.
+/// The environment in which a policy is trained: `model`, or JSBSim if `model` is `None`.
 pub(super) struct Ground {
     pub(super) model: Option<Arc<GreyBox>>,
     pub(super) origin: Origin,
@@ -20,8 +20,8 @@ pub(super) struct Ground {
 }
 
 impl Ground {
-    /// Scores `actor` in the environment of its training on a tenth of a target file. A policy that is trained in a model is
-    /// therefore chosen without flights in JSBSim.
+    /// Scores `actor` in the environment of its training, on a tenth of the easy and hard-corner attitudes of a target file. A
+    /// policy that is trained in a model is therefore chosen without flights in JSBSim.
     pub(super) fn evaluate(&self, actor: Arc<Actor>) -> Result<Evaluated> {
         let mut rows = TargetFile::generate(JUDGE_SEED).rows;
         rows.retain(|r| r.group != Group::HardOutside && r.number % 10 == r.number / 10 % 10);
@@ -41,10 +41,10 @@ impl Ground {
     }
 }
 
-/// Seed of the targets by which the best policy of a training is chosen. Other targets score the policies.
+/// Seed of the targets on which a training compares its policies and chooses the best one.
 const JUDGE_SEED: u64 = 2;
 
-/// Results of flights in JSBSim, for a policy that is trained in JSBSim.
+/// Flies the controllers of `make` to the targets `rows` in JSBSim and returns the results.
 #[cfg(feature = "demo")]
 pub(super) fn flown(make: Make, rows: &[Row]) -> Result<Vec<Outcome>> {
     let plant = greylag_sitl::plant::PlantOptions::default();

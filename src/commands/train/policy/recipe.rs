@@ -1,4 +1,4 @@
-//! The recipes (all settings) of a training, from the options of the command.
+//! Converts the options of `greylag train policy` into recipes. A recipe holds all settings of a training.
 
 use super::{Arguments, Place};
 use crate::learn::{AnalyticRecipe, Hyperparameters, PolicyRecipe, ValuationRecipe};

@@ -1,4 +1,4 @@
-//! The training of one policy: its loop, its curve, its files.
+//! The training of one policy: its loop, its learning curve, its files.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -24,7 +24,7 @@ use crate::sim::world::World;
 
 /// File from which a training is resumed.
 const CHECKPOINT: &str = "checkpoint.safetensors";
-/// Largest fraction of lost episodes without a warning.
+/// Largest fraction of lost episodes without a warning. An episode is lost when the state leaves the limits of validity.
 const MANY: f64 = 0.2;
 
 /// Record of a training, written into the folder of its learning curve.
@@ -55,7 +55,7 @@ pub(super) struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Trains an actor by the analytic policy gradient, then its critics. Returns `false` if interrupted.
+    /// Trains an actor by the analytic policy gradient, then fits critics to it. Returns `false` if interrupted.
     pub(super) fn climb(
         &self,
         recipe: &AnalyticRecipe,
@@ -81,7 +81,7 @@ impl Run<'_> {
     }
 
     pub(super) fn train<W: World>(&self, recipe: PolicyRecipe, world: W) -> Result<bool> {
-        // The number of steps is not part of the identity, so that a training can be continued with more steps.
+        // The number of steps is not part of the identity, so that a checkpoint can be continued with more steps.
         let of = PolicyRecipe { steps: 0, ..recipe.clone() };
         let of = (of, &self.ground.origin.model_sha256);
         let what = serde_json::to_string(&of)?;
@@ -140,7 +140,7 @@ impl Run<'_> {
         Ok(true)
     }
 
-    /// Writes the current policy, which is the best so far.
+    /// Writes the policy's files and the record of its training. Replaces those of earlier policies of this run.
     fn save(
         &self,
         method: &Method,
@@ -169,7 +169,7 @@ impl Run<'_> {
     }
 }
 
-/// Warns if many episodes end outside the validity limits.
+/// Warns if the fraction of lost episodes exceeds [`MANY`].
 fn warn(seed: u64, progress: &PolicyProgress) {
     let part = progress.lost as f64 / progress.episodes.max(1) as f64;
     if progress.updates > 0 && part > MANY {
@@ -182,7 +182,7 @@ fn warn(seed: u64, progress: &PolicyProgress) {
     }
 }
 
-/// A point of the learning curve that has only the results of the evaluation `e`.
+/// A point of the learning curve with the results of the evaluation `e`. All other values are zero.
 pub fn reached(e: Evaluated) -> CurvePoint {
     let Evaluated { easy_deg, hard_deg, divergence_rate, .. } = e;
     CurvePoint { easy_deg, hard_deg, divergence_rate, ..CurvePoint::default() }

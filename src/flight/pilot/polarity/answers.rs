@@ -1,16 +1,17 @@
-//! Modelled response to a small step of each surface.
+//! Step responses of the model: roll rate to aileron and pitch rate to elevator. The polarity check compares the measured rates
+//! with them, to see whether the surfaces act in the expected direction.
 
 use greylag_model::{GreyBox, Trim, TrimError, Twin};
 use greylag_physics::Command;
 
-/// Length of a response in state frames of 10 ms, including the frame of the step: 0.4 s. By then the roll rate has
-/// settled and the pitch rate has nearly settled. Later frames take the last value.
+/// Number of values of a response: one per state frame of 10 ms, from the frame of the step to 0.4 s after it. By then the roll
+/// rate has settled and the pitch rate has nearly settled. Later frames have the last value.
 const SPAN: usize = 41;
-/// Size of the simulated step of a command (−1..1): small enough to be linear, large compared with rounding.
+/// Size of the simulated step of a command (−1..1). It is small enough for a linear response and large compared with rounding.
 const STEP: f64 = 0.01;
 
-/// Responses in straight flight: roll rate after a unit step of the aileron command, and pitch rate after a unit step
-/// of the elevator command. Both are in rad/s, with one value per state frame of 10 ms.
+/// Step responses in straight flight: the change of the roll rate after a unit step of the aileron command, and of the pitch
+/// rate after a unit step of the elevator command. Both are in rad/s, with one value per state frame of 10 ms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answers {
     roll: [f64; SPAN],
@@ -24,7 +25,7 @@ impl Answers {
     ///
     /// If the model has no straight-flight trim at `airspeed`.
     pub fn of(model: &GreyBox, airspeed: f64) -> Result<Answers, TrimError> {
-        // one altitude suffices: a change of altitude by 1000 m changes a response by a tenth
+        // the reference altitude suffices, because 1000 m of altitude change a response by only a tenth
         let altitude = model.airframe.reference.altitude;
         let trim = Trim::straight(model, airspeed, altitude)?;
         let command = model.airframe.actuators.command(&trim.controls);
@@ -77,7 +78,7 @@ mod tests {
         // product of inertia and the yaw rate reduce it to about half.
         let roll = answers.after(0, 20);
         assert!(roll > 1.0 && roll < 3.0, "{roll}");
-        // q̇ = ½ρV² S c Cmδe δe / Jy = −43 rad/s² at first. After two states q is −0.9 rad/s.
+        // q̇ = ½ρV² S c Cmδe δe / Jy = −43 rad/s² at first, which makes q = −0.9 rad/s after two steps of 10 ms
         let pitch = answers.after(1, 4);
         assert!(pitch < -0.5 && pitch > -2.0, "{pitch}");
     }

@@ -1,4 +1,5 @@
-//! Data of the polarity check: recorded rates and commands, and their regression on modelled responses.
+//! Data of the polarity check, which finds out whether aileron and elevator act in the direction that the model says. The
+//! measured roll and pitch rates are regressed on the modelled responses to the recorded commands.
 
 use std::ops::RangeInclusive;
 
@@ -7,18 +8,19 @@ use nalgebra::{Matrix3, Vector3};
 use super::LONGEST;
 use super::answers::Answers;
 
-/// Largest delay of link and flight controller that is tried on top of the modelled response, state frames of 10 ms.
+/// Largest delay of link and flight controller that is tried, in state frames (messages with the state) of 10 ms. It adds to
+/// the delay within the modelled response.
 const LATENESS: isize = 9;
 /// Smallest number of rate changes for a regression.
 const LEAST: usize = 14;
 /// Upper limit of the lag-one autocorrelation of the regression residuals.
 const MAX_AUTOCORRELATION: f64 = 0.9;
-/// Handover times of control authority that are tried, in state frames before the first state of the check. The exact
-/// time is unknown: the notice of the handover shares the link with the states, and the flight controller samples its
-/// channels at its own times.
+/// Times that are tried for the handover of control to the companion, in state frames before the first state of the check.
+/// The exact time is unknown: the notice of the handover shares the link with the states, and the flight controller samples
+/// the commands at its own times.
 const TAKEN: RangeInclusive<isize> = -1..=2;
 
-/// Estimated gain on the modelled response, with its standard error.
+/// Estimated ratio of the measured to the modelled response of one axis, with its standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fit {
     /// Gain: 1 is the modelled response, −1 the opposite response.
@@ -46,7 +48,7 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// Stores the rates of state frame `index`, rad/s. States after the longest check are ignored.
+    /// Stores the rates of state frame `index`, rad/s. Frames that are already stored or after the longest check are ignored.
     pub(super) fn rates(&mut self, index: usize, rates: [f64; 2]) {
         if (self.rates.len()..=LONGEST).contains(&index) {
             self.rates.resize(index + 1, None);
@@ -54,14 +56,15 @@ impl Evidence {
         }
     }
 
-    /// Stores a change of the command of `axis` in reply to state frame `index`.
+    /// Stores the change `by` of the command of `axis` that was sent in reply to state frame `index`.
     pub(super) fn change(&mut self, axis: usize, index: usize, by: f64) {
         if by != 0.0 {
             self.changes[axis].push((index as isize, by));
         }
     }
 
-    /// Best estimates for roll and pitch with a common delay and handover time; `None` if the record is too short.
+    /// The estimates for roll and pitch. Both axes have the same delay and handover time, which are chosen for the best fit.
+    /// `None` if the record is too short or does not determine the gains.
     pub(super) fn fit(&self, answers: &Answers) -> Option<[Fit; 2]> {
         let both = (0..=LATENESS).flat_map(|late| {
             let answered = [0, 1].map(|axis| self.answered(answers, axis, late));
@@ -75,8 +78,8 @@ impl Evidence {
         both.min_by(|a, b| misfit(a).total_cmp(&misfit(b)))
     }
 
-    /// Modelled change of the rate of `axis` from each state to the next, rad/s, if commands act `late` state frames
-    /// late.
+    /// Modelled change of the rate of `axis` from each state frame to the next, rad/s, if the commands are delayed by `late`
+    /// frames.
     fn answered(&self, answers: &Answers, axis: usize, late: isize) -> Vec<f64> {
         let at = |state: isize| -> f64 {
             let terms = self.changes[axis].iter();
@@ -86,10 +89,11 @@ impl Evidence {
         states.windows(2).map(|pair| pair[1] - pair[0]).collect()
     }
 
-    /// Least squares on the changes of the rate between states. The disturbance of the rates by gusts resembles a
-    /// random walk, so its changes are nearly white. The standard error is corrected for the remaining autocorrelation.
-    /// There are three regressors: the modelled response to the commands, the response to a step of unknown size at the
-    /// handover, `taken` states before the first, and a constant.
+    /// Estimates the gain of one axis by least squares. The measured changes of the rate from frame to frame are regressed on
+    /// three regressors: the modelled response to the commands, the modelled response to a step of unknown size at the
+    /// handover, and a constant. The handover is `taken` frames before the first. Changes are used because the effect of gusts
+    /// on the rates resembles a random walk, whose changes are nearly white. The standard error is corrected for the remaining
+    /// autocorrelation.
     fn axis(&self, answers: &Answers, axis: usize, answered: &[f64], taken: isize) -> Option<Fit> {
         let to_step = |state: isize| answers.after(axis, state + taken);
         let rows = || {
@@ -151,7 +155,7 @@ mod tests {
             (fit(-0.9, 8.0), right, SEEN[0], reversed(Axis::Roll)),
             (fit(-0.9, 8.0), right, SEEN[0] - 1, Verdict::Open),
             (right, fit(-0.9, 8.0), SEEN[1], reversed(Axis::Pitch)),
-            // A gain that is large but not certain, then gains that are certain but too small for a response.
+            // First a gain that is large but not certain, then two gains that are certain but too small for a response.
             (fit(-0.9, 6.9), right, SEEN[1], Verdict::Open),
             (fit(-0.09, 50.0), right, SEEN[1], Verdict::Open),
             (right, fit(0.09, 50.0), LONGEST - 1, Verdict::Open),
@@ -163,7 +167,7 @@ mod tests {
     #[test]
     fn what_is_not_certain_in_the_end_is_no_answer_or_too_much_air() {
         let right = fit(0.9, 8.0);
-        // By three standard errors, a gain of 0.2 ± 0.09 is below half of the modelled response, and 0.6 ± 0.3 is not.
+        // A surface does not respond if gain + 3 errors is below 0.5: 0.2 + 3 · 0.09 is below, 0.6 + 3 · 0.3 is not.
         for (roll, pitch, fault) in [
             (fit(0.2, 2.2), right, Fault::Unanswered(Axis::Roll)),
             (right, fit(0.2, 2.2), Fault::Unanswered(Axis::Pitch)),
@@ -178,8 +182,8 @@ mod tests {
         }
     }
 
-    /// The record of an aircraft that responds as the model does. Both rates also contain a disturbance, which changes
-    /// by `leftover` (rad/s) at each state frame.
+    /// The record of an aircraft that responds as the model does. Both rates also contain a disturbance. At state frame k it
+    /// changes by `leftover(k)`, rad/s.
     fn record(answers: &Answers, states: usize, leftover: impl Fn(usize) -> f64) -> Evidence {
         let mut evidence = Evidence::default();
         let changes = [[(0, 0.06), (12, -0.12)], [(6, 0.06), (18, -0.12)]];
@@ -217,7 +221,7 @@ mod tests {
 
     #[test]
     fn gusts_that_wander_leave_more_doubt_than_as_large_ones_that_do_not() {
-        // Rate changes of ±0.01 rad/s: the sign alternates every nine states, or every state.
+        // The rates change by ±0.01 rad/s per state frame. The sign alternates every nine frames, or every frame.
         let answers = x8();
         let doubt = |states: usize| {
             let gust = |index: usize| if (index / states).is_multiple_of(2) { 0.01 } else { -0.01 };

@@ -3,8 +3,9 @@
 //! A flight controller can fly well with its own loops although the channel order, a reversal or a mixer between the
 //! companion's commands and the surfaces is wrong. When control authority is given, the companion therefore first
 //! commands level trim with small pulses of aileron and elevator, at different times. Measured rates are regressed on
-//! the modelled responses to these pulses. Gusts are uncorrelated with the pulses. The check ends when both signs are
-//! certain, usually after 0.3 s. Until then the pulses grow from round to round.
+//! the modelled responses to these pulses. The regression gives a gain: the ratio of the measured to the modelled response.
+//! Gusts are uncorrelated with the pulses. The check ends when both signs are certain, usually after 0.3 s. It has up to
+//! three rounds of pulses. The pulses of each round are larger than those of the round before.
 
 mod answers;
 mod evidence;
@@ -30,10 +31,10 @@ const ROUND: usize = PATTERN.len() * LENGTH + 2 * OFFSET;
 const LONGEST: usize = PULSES.len() * ROUND;
 /// Ratio of the gain to its standard error above which a sign is certain. It is tested at every state frame.
 const CERTAIN: f64 = 7.0;
-/// State frames after which the signs of aileron and elevator are evaluated. By then the surface has moved both ways
-/// and the aircraft has responded. A single edge may coincide with a gust.
+/// Numbers of state frames after which the signs of aileron and elevator are evaluated. By then the surface has moved both
+/// ways and the aircraft has responded. The response to a single movement could be mistaken for a gust.
 const SEEN: [usize; 2] = [LENGTH + ANSWERED, OFFSET + LENGTH + ANSWERED];
-/// Number of state frames after a pulse edge within which the response appears.
+/// Number of state frames within which the response to a movement of the surface appears.
 const ANSWERED: usize = 7;
 /// Smallest gain that counts as a response. A model may be wrong, but not by a factor of ten.
 const ANSWER: f64 = 0.1;
@@ -45,9 +46,9 @@ const DEPARTED: f64 = 20.0 * std::f64::consts::PI / 180.0;
 pub(super) enum Verdict {
     /// The check is not finished.
     Open,
-    /// Both signs are right, with the ratios of measured to modelled response.
+    /// Both signs are right. The values are the gains of roll and pitch.
     Right([f64; 2]),
-    /// Control must be returned.
+    /// Control must be returned to the flight controller.
     Wrong(Fault),
 }
 
@@ -171,7 +172,7 @@ fn pulse(index: isize) -> f64 {
     }
 }
 
-/// The verdict on the estimates after state frame `index`.
+/// The verdict that follows from the estimated gains after state frame `index`.
 fn judged(fits: &[Fit; 2], index: usize) -> Verdict {
     let certain = |axis: usize| {
         let fit = &fits[axis];
@@ -188,7 +189,7 @@ fn judged(fits: &[Fit; 2], index: usize) -> Verdict {
     if index < LONGEST {
         return Verdict::Open;
     }
-    // not certain after all rounds: too small a response, or too much turbulence
+    // the signs are not certain after all rounds: the response is too small, or there is too much turbulence
     let dead = |fit: &Fit| fit.gain + 3.0 * fit.error < 0.5;
     match (dead(&fits[0]), dead(&fits[1])) {
         (true, _) => Verdict::Wrong(Fault::Unanswered(Axis::Roll)),
@@ -210,7 +211,7 @@ mod tests {
         verdict_after(2, late, wired)
     }
 
-    /// Like `verdict`, for control authority that was given `early` states before its notice arrives.
+    /// Like `verdict`, but control authority was given `early` states before its notice arrives.
     fn verdict_after(
         early: usize,
         late: usize,
@@ -253,7 +254,7 @@ mod tests {
 
     #[test]
     fn right_signs_pass_however_late_the_commands_arrive() {
-        // Up to 60 ms: twice the delay of a serial link with a controller that samples its channels at 50 Hz.
+        // Up to 60 ms: twice the delay of a serial link to a flight controller that samples its channels at 50 Hz.
         for late in 0..=6 {
             let (verdict, states) = verdict(late, |surfaces| surfaces);
             let Verdict::Right(gains) = verdict else { panic!("{late}: {verdict:?}") };
@@ -269,7 +270,7 @@ mod tests {
         for late in [0, 3, 6] {
             let roll = verdict(late, |[aileron, elevator]| [-aileron, elevator]).0;
             assert_eq!(roll, Verdict::Wrong(Fault::Reversed(Axis::Roll)), "{late}");
-            // A reversed trim elevator pitches the nose up before the first pulse, for any lead of the handover.
+            // The trim deflection of a reversed elevator pitches the nose up before the first pulse.
             for early in 0..=4 {
                 let (pitch, _) =
                     verdict_after(early, late, |[aileron, elevator]| [aileron, -elevator]);

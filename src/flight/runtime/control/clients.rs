@@ -1,4 +1,5 @@
-//! Client side of the control thread: requests, telemetry, forwarding to the vehicle.
+//! The part of the control thread that serves the clients, for example ground stations. It processes their requests, sends them
+//! telemetry and forwards their frames to the flight controller.
 
 use std::time::{Duration, Instant};
 
@@ -48,7 +49,7 @@ impl Control {
         self.send_to_clients();
     }
 
-    /// Reports once that frames were refused because their signature is missing or invalid.
+    /// Reports, once in a flight, that frames were refused because their signature is missing or invalid.
     pub(super) fn report_refusals(&mut self) {
         let refused = self.ports.signing().map_or(0, |counts| counts.refused());
         if refused > 0 && !self.told_refusals {

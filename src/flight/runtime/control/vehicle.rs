@@ -1,4 +1,7 @@
-//! Vehicle side of the control thread: it answers the newest state. Older queued states are only recorded.
+//! Vehicle side of the control thread: it receives the states of the vehicle (flight controller or simulator) and answers with
+//! commands.
+//!
+//! In real time only the newest state is answered; older queued states are only recorded. In lockstep every state is answered.
 
 use std::time::{Duration, Instant};
 
@@ -27,9 +30,9 @@ struct Heard {
 }
 
 impl Control {
-    /// Handles `arrival` and all queued arrivals. In real time only the newest state is answered. In lockstep every
-    /// state is answered, because the vehicle waits for each reply. After a stall, states are live from the vehicle
-    /// time `live` on.
+    /// Handles `arrival` and all queued arrivals. In real time only the newest state is answered. In lockstep every state is
+    /// answered, because the vehicle waits for each reply. After a stall (a time in which this computer did not run the
+    /// program) only states from the vehicle time `live` on are up to date.
     pub(super) fn take_vehicles(&mut self, arrival: Option<Arrival>, live: Option<Time>) {
         let mut newest = arrival.and_then(|arrival| self.take_vehicle(arrival, None));
         if self.clock.pace() == Pace::RealTime {
@@ -49,8 +52,8 @@ impl Control {
         self.take_notices();
     }
 
-    /// Handles arrivals until a state is live, for at most 50 ms. A socket buffer that became full in a stall holds the
-    /// oldest states of the stall.
+    /// Handles arrivals until a state from the time `live` or later arrives, for at most 50 ms. A socket buffer that became
+    /// full in a stall holds old states, which come first.
     fn catch_up(&mut self, mut newest: Option<Heard>, live: Time) -> Option<Heard> {
         let until = Instant::now() + CATCH_UP;
         while newest.is_none_or(|heard| heard.state.time < live) {
@@ -60,7 +63,7 @@ impl Control {
         newest
     }
 
-    /// Handles one arrival. Returns the newest state: the last one that the arrival completed, otherwise `newest`.
+    /// Handles one arrival. Returns the last state that the arrival completed, or `newest` if it completed none.
     fn take_vehicle(&mut self, arrival: Arrival, newest: Option<Heard>) -> Option<Heard> {
         let packet = match arrival {
             Arrival::Packet(mut packet) => {
@@ -137,7 +140,7 @@ impl Control {
         self.account(heard, &decision, plan, latency);
     }
 
-    /// Records timing and row of a tick, after its command is sent.
+    /// Records the timing and the log row of a tick, after its command is sent.
     fn account(&mut self, heard: &Heard, decision: &Decision, plan: Plan, latency: Duration) {
         let Heard { state, peer, arrived } = heard;
         if self.last_arrival.is_none() {
@@ -169,7 +172,7 @@ impl Control {
         }
     }
 
-    /// Handles the vehicle's notices.
+    /// Handles the vehicle's notices, such as the start and the end of control authority.
     pub(super) fn take_notices(&mut self) {
         while let Some(notice) = self.vehicle.take_notice() {
             if let Some(words) = notice.ending() {

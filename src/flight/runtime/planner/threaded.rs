@@ -1,4 +1,4 @@
-//! A controller on a separate thread. Its plan is used at the tick of its request or not at all.
+//! A controller on a separate thread. Its plan, the command for one tick, is used at the tick of its request or not at all.
 
 use std::time::{Duration, Instant};
 
@@ -14,15 +14,16 @@ pub struct Threaded {
     pub(super) plans: Receiver<(u64, Command)>,
     thread: Option<JoinHandle<()>>,
     tick: u64,
-    /// Whether the controller is still to be reset, because the planner was busy at the last engagement.
+    /// Whether the controller must be reset at the next request. It was busy when it was last put in charge, so the request to
+    /// reset it was not delivered.
     owed: bool,
     pub(super) deadline: Duration,
     pace: Pace,
 }
 
 impl Threaded {
-    /// Starts the thread. In real time a plan is late `deadline` after the arrival of its state frame. In lockstep
-    /// there is no deadline.
+    /// Starts the thread. In real time, a plan is late if it is not ready `deadline` after the arrival of its state frame. In
+    /// lockstep there is no deadline.
     pub fn start(
         mut controller: Box<dyn Controller>,
         deadline: Duration,
@@ -50,7 +51,7 @@ impl Threaded {
         })
     }
 
-    /// The plan for `request`, whose state arrived at `arrived`.
+    /// Requests a plan and waits for it. `arrived` is the time at which the state of `request` arrived.
     pub fn plan(&mut self, request: &Request, arrived: Instant) -> Plan {
         self.tick += 1;
         // plans for earlier ticks are obsolete
@@ -92,7 +93,7 @@ impl Threaded {
 impl Drop for Threaded {
     fn drop(&mut self) {
         self.requests = None;
-        // the thread may block on a plan that nobody has fetched
+        // the thread may be blocked because nobody has fetched its last plans
         while self.plans.recv().is_ok() {}
         if let Some(thread) = self.thread.take() {
             // a panic of the controller has been reported by its thread

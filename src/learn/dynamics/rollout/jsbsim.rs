@@ -1,4 +1,5 @@
-//! Rollouts in JSBSim's integration scheme: one model evaluation per step, and a memory of the previous step.
+//! Rollouts (simulations) with JSBSim's integration scheme and their backpropagation. The scheme evaluates the model once per
+//! step and keeps a memory of the previous step. The model is a physical prior plus a learned residual.
 
 use crate::dynamics::kernel::InstructionSet;
 use crate::dynamics::packet::Packet;
@@ -18,7 +19,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         let mut last = None;
         for step in 0..=self.steps() {
             let at = self.at(step, state);
-            // This scheme integrates accelerations only. The residual's rates of roll and pitch angle are zero.
+            // This scheme integrates accelerations only. The residual does not contribute to the rates of roll and pitch.
             let zero = R::zero();
             let learned = State { roll: zero, pitch: zero, ..self.learned(&at, step, trace) };
             let outputs = self.ask(&at);
@@ -51,7 +52,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         for step in (0..=self.steps()).rev() {
             let mut norms = [nothing(); 2];
             if step == 0 {
-                // The start state is recorded, so its gradient is dropped. Step 0 determines only the memory.
+                // The start state is a recorded one, so its gradient is not needed. Step 0 determines only the memory.
                 slope = nothing();
             } else {
                 let [error, prior, learned] = self.direct(step, trace, of);
@@ -114,7 +115,7 @@ struct Back<R> {
     memory: Vector<R>,
 }
 
-/// Linear and angular acceleration of the prior and the residual together.
+/// Linear and angular acceleration due to prior and residual together.
 #[inline(always)]
 fn pushed<R: Real>(
     outputs: &PriorOutputs<R>,
@@ -132,7 +133,8 @@ fn pushed<R: Real>(
     (acceleration, spin)
 }
 
-/// [`advance_jsbsim`] as a function of state, acceleration and memory, weighted by the gradients of its outputs.
+/// A scalar function of state, acceleration and memory: the sum of the outputs of [`advance_jsbsim`], each multiplied by the
+/// loss gradient with respect to it.
 struct Scheme<'a, R> {
     geometry: &'a Geometry,
     density: R,
@@ -159,7 +161,7 @@ impl<R: Real> Sloped<R, 14> for Scheme<'_, R> {
     }
 }
 
-/// Backpropagates through [`pushed`]: gradients with respect to the state and the residual.
+/// Backpropagates through [`pushed`]. Returns the gradients with respect to the state and to the residual's state rates.
 #[inline(always)]
 fn push_back<R: Real>(
     state: &State<R>,
@@ -184,7 +186,7 @@ fn push_back<R: Real>(
         alpha: speed * cb * downward,
         beta: speed * across,
     };
-    // a = V̇ e_V + V β̇ e_β + V cosβ α̇ e_α, with the unit vectors turning with α and β
+    // a = V̇ e_V + V β̇ e_β + V cosβ α̇ e_α. The unit vectors depend on α and β
     let turned = learned.airspeed * cb - speed * learned.beta * sb;
     let to_state = State {
         roll: zero,

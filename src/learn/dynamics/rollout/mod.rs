@@ -1,5 +1,9 @@
-//! A block of rollouts: a forward pass that stores a trace, then a reverse pass for the gradient, eqs. (20) and (22)
-//! of \[GSFM26\].
+//! Simulation of the learned model from recorded states (rollouts), and the gradient of the training objective by
+//! backpropagation through the simulation: eqs. (20) and (22) of the paper \[GSFM26\] (see `src/lib.rs`).
+//!
+//! The state rate of the model is F_p + F_a. The prior F_p is a physical model whose coefficients may be trained. The residual
+//! F_a is a neural network. A block of rollouts is computed at once, one in each lane of a SIMD vector. The forward pass
+//! stores a trace, which the reverse pass reads.
 
 mod jsbsim;
 mod rk4;
@@ -16,13 +20,13 @@ use greylag_physics::effects::Needs;
 use greylag_physics::rigid_body::Vector;
 use greylag_physics::{Controls, State};
 
-/// Number of points whose weight gradients are summed together. Their data fits into the cache.
+/// Number of points (evaluations of the network) whose weight gradients are summed together. Their data fit into the cache.
 const CHUNK: usize = 20;
 
 /// The model that is learned.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// The prior with its present coefficients. A residual of the prior is not used.
+    /// The prior with its present coefficients. If it has a residual of its own, that residual is not used.
     pub prior: GreyBox,
     /// Network of the residual.
     pub network: Passes,
@@ -32,21 +36,21 @@ pub struct Subject {
     pub prior_slopes: PriorSlopes,
 }
 
-/// Whether the gradient with respect to the prior's coefficients is computed, because they are trained.
+/// Whether the gradient with respect to the prior's coefficients is computed. It is needed only if they are trained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PriorSlopes {
-    /// The coefficients are frozen.
+    /// The gradient is not computed.
     None,
-    /// The gradient with respect to all coefficients and to Jxz is computed.
+    /// The gradient is computed with respect to all coefficients and to the product of inertia Jxz.
     All,
 }
 
 /// Recorded data of `Packet::WIDTH` rollouts.
 #[derive(Clone, Debug, Default)]
 pub struct Recorded<R> {
-    /// States one step before the start, at the start, and after each step. Roll is in −π..π.
+    /// States one step before the start, at the start, and after each step. Roll is between −π and π.
     pub states: Vec<[R; 8]>,
-    /// Acting aileron, elevator, throttle and rudder in each step, including the step before the start.
+    /// Aileron, elevator, throttle and rudder that act in each step, including the step before the start.
     pub controls: Vec<[R; 4]>,
     /// Values of the formulas' `lag(…)` and `delay(…)` terms in each step, including the step before the start; empty
     /// for a model without such terms.
@@ -57,27 +61,27 @@ pub struct Recorded<R> {
     pub weight: Option<R>,
 }
 
-/// Data of a forward pass for the reverse pass. Step 0 precedes the start of the rollout. [`Integrator::Jsbsim`] needs
-/// step 0, and RK4 omits it.
+/// Data that the forward pass stores for the reverse pass. Step 0 is the step before the start of the rollout. Only
+/// [`Integrator::Jsbsim`] computes it, because that integrator uses the acceleration of the previous step.
 #[derive(Clone, Debug)]
 pub struct Trace<R> {
     /// The states at which the model was evaluated: one per step, four per step for RK4.
     states: Vec<State<R>>,
     /// The network's activations at each of these states.
     units: Vec<R>,
-    /// State rates F_p of the prior and F_a of the residual at the start of each step.
+    /// State rates F_p and F_a at the start of each step.
     rates: Vec<[State<R>; 2]>,
     /// The states after each step.
     ends: Vec<State<R>>,
-    /// The acceleration in each step, and the integrator's memory before the step.
+    /// The acceleration in each step, and the acceleration of the step before, which the integrator keeps.
     memory: Vec<[Vector<R>; 2]>,
-    /// The network's gradients with respect to the pre-activations, for a chunk of points.
+    /// Gradients with respect to the network's pre-activations at the last [`CHUNK`] points.
     slopes: Vec<R>,
-    /// Sums over points of the gradient with respect to the coefficients.
+    /// Gradient with respect to the prior's coefficients, summed over points.
     coefficients: Vec<R>,
 }
 
-/// Results of a forward pass, summed over the rollouts with their weights.
+/// Results of a forward pass: weighted sums over the rollouts. x_c is the scale of each state, eq. (21).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
     /// Σ over steps of ‖(ŝ − s)/x_c‖², with the predicted state ŝ and the recorded state s.
@@ -135,15 +139,15 @@ fn sum<R: Real>(a: &State<R>, b: &State<R>) -> State<R> {
     a.advance(b, 1.0)
 }
 
-/// A forward or reverse pass over one block.
+/// Inputs of a forward or reverse pass over one block of rollouts.
 pub struct Pass<'a, S: InstructionSet> {
     /// The instruction set for which the pass is compiled.
     pub set: S,
     /// The model under training.
     pub subject: &'a Subject,
-    /// The recorded data.
+    /// The recorded data of the block.
     pub recorded: &'a Recorded<S::Number>,
-    /// The scale of errors and rates, eq. (21) or ones.
+    /// The scale by which errors and rates are divided: x_c, eq. (21), or ones.
     pub scale: &'a [f64; 8],
 }
 
@@ -152,8 +156,8 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         self.recorded.controls.len() - 1
     }
 
-    /// Integrates the block. Returns the sums, and one value per lane that is finite only if the lane's path is
-    /// finite.
+    /// Simulates the block. Returns the sums, and one number per lane that is finite only if all states of that lane's rollout
+    /// are finite.
     #[inline(always)]
     pub fn forward(&self, trace: &mut Trace<R>) -> (Sums, R) {
         let totals = match self.subject.prior.integrator {
@@ -164,8 +168,8 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         (Sums { error, prior, learned }, totals[0] + totals[1] + totals[2])
     }
 
-    /// Adds the gradient of the objective with respect to the trained parameters to `gradient`. `of` holds the
-    /// derivatives of the objective with respect to the sums of the forward pass.
+    /// Adds to `gradient` the gradient of the objective with respect to the trained parameters. `of` holds the derivatives of
+    /// the objective with respect to the sums of the forward pass.
     #[inline(always)]
     pub fn reverse(&self, trace: &mut Trace<R>, of: &SumSlopes, gradient: &mut Gradient) {
         trace.coefficients.fill(R::zero());
@@ -191,7 +195,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         At { state, controls, density: self.recorded.density[step] }
     }
 
-    /// The prior's outputs at a point.
+    /// The prior's outputs at the point `at`.
     #[inline(always)]
     fn ask(&self, at: &At<R>) -> PriorOutputs<R> {
         let model = &self.subject.prior;
@@ -201,7 +205,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         }
     }
 
-    /// State rates F_a of the residual at a point.
+    /// State rates F_a of the residual at the point `at`. Stores state and activations in `trace` under the index `point`.
     #[inline(always)]
     fn learned(&self, at: &At<R>, point: usize, trace: &mut Trace<R>) -> State<R> {
         let Subject { network, scales, .. } = self.subject;
@@ -211,7 +215,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         scales.rate(network.forward(scales.inputs(&at.state, &at.controls), units))
     }
 
-    /// x/x_c² and ‖x/x_c‖², multiplied by the weight of the rollout.
+    /// x/x_c² and ‖x/x_c‖², both multiplied by the weight of the rollout.
     #[inline(always)]
     fn weighted(&self, x: [R; 8]) -> ([R; 8], R) {
         let weight = self.recorded.weight.unwrap_or(R::from_f64(1.0));
@@ -225,7 +229,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         (half_slope, square)
     }
 
-    /// The difference ŝ − s after `step`, weighted by `weighted`, with the roll error wrapped to −π..π.
+    /// The error ŝ − s after `step`, with the roll error wrapped to −π..π, in the form that [`Pass::weighted`] returns.
     #[inline(always)]
     fn error(&self, step: usize, predicted: &State<R>) -> ([R; 8], R) {
         use std::f64::consts::{PI, TAU};
@@ -239,7 +243,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         self.weighted(error)
     }
 
-    /// Adds a step's error and norms to `totals`.
+    /// Adds to `totals` the squared norms of the error, of F_p and of F_a in `step`.
     #[inline(always)]
     fn tally(&self, step: usize, trace: &Trace<R>, totals: &mut [R; 3]) {
         let [prior, learned] = &trace.rates[step];
@@ -248,8 +252,8 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         totals[2] += self.weighted(learned.to_array()).1;
     }
 
-    /// Derivatives of the objective through this step's part of the sums, with respect to the state after the step,
-    /// to F_p and to F_a.
+    /// Derivatives of the objective with respect to the state after `step`, to F_p and to F_a, through the terms of this step in
+    /// the sums only.
     #[inline(always)]
     fn direct(&self, step: usize, trace: &Trace<R>, of: &SumSlopes) -> [State<R>; 3] {
         let [prior, learned] = &trace.rates[step];
@@ -263,8 +267,9 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         ]
     }
 
-    /// Backpropagates through prior and residual at a point. Returns the gradient with respect to the state there,
-    /// and adds the gradient with respect to the trained parameters. Points must come in descending order.
+    /// Backpropagates through prior and residual at the point `place`. `prior` and `learned` are the derivatives of the objective
+    /// with respect to F_p and F_a. Returns the gradient with respect to the state at the point, and adds the gradient with
+    /// respect to the trained parameters to `gradient`. Must be called for the points in descending order.
     #[inline(always)]
     fn point(
         &self,
@@ -298,7 +303,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         }
         let units = &trace.units[point * width..][..width];
         let input = network.backward(units, output, &mut trace.slopes[slot * wide..][..wide]);
-        // the first six inputs are the state from airspeed on
+        // the network's first six inputs are the states 2 to 7, airspeed to sideslip
         for i in 0..6 {
             slope[2 + i] = input[i].mul_add(R::from_f64(scales.factor[i]), slope[2 + i]);
         }
@@ -312,7 +317,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
     }
 }
 
-/// A point of a rollout.
+/// A point of a rollout, at which prior and residual are evaluated.
 #[derive(Clone, Copy)]
 struct Place {
     /// Step to which the point belongs.

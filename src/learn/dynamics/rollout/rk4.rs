@@ -1,4 +1,5 @@
-//! Rollouts by the classical Runge–Kutta method.
+//! Rollouts by the classical Runge–Kutta method: the forward pass, and the reverse pass that computes the gradient of the
+//! loss.
 
 use crate::dynamics::kernel::InstructionSet;
 use crate::dynamics::packet::Packet;
@@ -44,13 +45,13 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         of: &SumSlopes,
         gradient: &mut Gradient,
     ) {
-        // the gradient with respect to the state after the step
+        // the gradient of the loss with respect to the state after the step
         let mut slope = nothing();
         for step in (1..=self.steps()).rev() {
             let [error, norm_prior, norm_learned] = self.direct(step, trace, of);
             slope = sum(&slope, &error);
             let mut before = slope;
-            // the gradient with respect to the state at which the following stage was evaluated
+            // the gradient of the loss with respect to the state at which the following stage was evaluated
             let mut later = nothing();
             for stage in (0..4).rev() {
                 let ahead = AHEAD.get(stage + 1).copied().unwrap_or(0.0);

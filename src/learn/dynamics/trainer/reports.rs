@@ -1,4 +1,6 @@
-//! Reports of a training: errors, progress, trained coefficients.
+//! Reports of the training of a dynamics model: errors, progress and trained coefficients.
+//!
+//! The model is a prior (a physical model) plus a residual network. The numbers of equations refer to \[GSFM26\].
 
 use serde::{Deserialize, Serialize};
 
@@ -8,10 +10,10 @@ use crate::dynamics::loss::Loss;
 use greylag_model::residual::ResidualError;
 use greylag_num::dense::DenseError;
 
-/// A training cannot start or continue.
+/// Reason why a training cannot start or continue.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainError {
-    /// The recipe is invalid.
+    /// A setting of the training is invalid.
     #[error("the training's options: {0}")]
     Recipe(&'static str),
     /// A coefficient cannot be trained.
@@ -28,7 +30,7 @@ pub enum TrainError {
         "the flights have no stretch of {0} samples without a gap, which one rollout takes; give longer logs, or shorter rollouts"
     )]
     Data(usize),
-    /// The bare prior diverges on more than half of the rollouts.
+    /// The prior without a residual diverges on more than half of the rollouts.
     #[error(
         "model {0} diverges on most rollouts before training starts: it is not a model of this aircraft, or the logs are of another"
     )]
@@ -55,7 +57,7 @@ pub struct Progress {
     pub steps: usize,
     /// Mean loss over the updates since the last report. `lost` is the sum over these updates.
     pub loss: Loss,
-    /// Mean of L_pred/L_prior, eq. (23), over the updates since the last report.
+    /// Mean over these updates of the prediction loss divided by that of the prior alone, L_pred/L_prior, eq. (23).
     pub normalised: f64,
     /// λ of eq. (24): the penalty on the residual is divided by it.
     pub lambda: f64,
@@ -66,9 +68,9 @@ pub struct Progress {
 pub struct Moment {
     /// Number of updates made.
     pub update: u64,
-    /// Relative prediction loss L_pred/L_prior, eq. (23).
+    /// Prediction loss divided by that of the prior alone, L_pred/L_prior, eq. (23).
     pub normalised: f64,
-    /// Residual ratio ‖F_a‖/‖F_p‖, eq. (22).
+    /// Ratio ‖F_a‖/‖F_p‖ of the state rates of residual and prior, eq. (22).
     pub ratio: f64,
     /// λ of eq. (24): the penalty on the residual is divided by it.
     pub lambda: f64,

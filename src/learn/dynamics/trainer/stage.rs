@@ -1,4 +1,7 @@
-//! Data of a training stage with one rollout length: windows, their weights and order, and the prior's error.
+//! Data of a training stage, in which all rollouts have the same length.
+//!
+//! A rollout is a simulation from a recorded state. A window is the section of a recorded flight that a rollout is compared
+//! with. The prior is the model without its network.
 
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
@@ -13,24 +16,25 @@ use crate::dynamics::windows::{Track, Window, windows};
 use greylag_model::GreyBox;
 use greylag_num::stream;
 
-/// Largest number of windows from which the bare prior's error, L_prior of eq. (23), is computed.
+/// Largest number of windows from which the prior's loss, L_prior of eq. (23) of \[GSFM26\] (T. Guerin et al., 2026), is
+/// computed.
 const PRIOR_WINDOWS: usize = 4096;
 const SHUFFLE: u64 = 2;
 
-/// State of a stage with one rollout length.
+/// State of a training stage with rollouts of `steps` steps.
 pub(super) struct Stage {
     pub(super) steps: usize,
-    /// Prediction loss of the bare prior, L_prior.
+    /// Divisor of the prediction loss: the prior's loss L_prior, or 1 with [`Criterion::Plain`].
     pub(super) prior_error: f64,
     pub(super) all: Vec<Window>,
-    /// Number of the epoch for which `order` was shuffled.
+    /// Number of the epoch for which `order` was shuffled, from 0.
     pass: u64,
     order: Vec<Window>,
 }
 
 impl Stage {
-    /// Collects the rollouts of `steps` steps. `bare` is the model without a residual, whose error on them is
-    /// computed.
+    /// Collects all windows of `steps` steps in `tracks`, weights them and computes the loss of `bare`, the model without its
+    /// network.
     pub(super) fn new(
         bare: &Subject,
         recipe: &Recipe,
@@ -59,14 +63,14 @@ impl Stage {
             return Err(TrainError::Prior(bare.prior.name.clone()));
         }
         let prior_error = match recipe.criterion {
-            // if the prior had no error, the divisor would be zero
+            // a prior without error would make the divisor zero
             Criterion::Scaled => loss.prediction.max(1e-12),
             Criterion::Plain => 1.0,
         };
         Ok(Stage { steps, prior_error, all, pass: u64::MAX, order: Vec::new() })
     }
 
-    /// The rollouts of an update. Each epoch shuffles the data anew.
+    /// The windows of update number `update`. Each epoch shuffles the windows anew.
     pub(super) fn minibatch(&mut self, recipe: &Recipe, update: u64) -> &[Window] {
         let batch = recipe.batch.min(self.all.len());
         let passes = (self.all.len() / batch) as u64;
@@ -81,12 +85,12 @@ impl Stage {
     }
 }
 
-/// Sets the weights of `all` by [`Recipe::floor`], scaled to a mean of 1.
+/// Weights the windows `all` by the prior's errors, as [`Recipe::floor`] defines, and scales the weights to a mean of 1.
 fn weigh(all: &mut [Window], model: &GreyBox, tracks: &[Track], steps: usize, floor: f64) {
     let mut weights: Vec<f64> =
         all.par_iter().map(|w| off_after(model, tracks, w, steps).powi(2)).collect();
     let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
-    // if the prior had no error, the divisor would be zero
+    // a prior without error would make the divisor zero
     let unit = mean(&weights).max(f64::MIN_POSITIVE);
     weights.iter_mut().for_each(|w| *w = 1.0 / (*w / unit + floor * floor));
     let unit = mean(&weights);

@@ -1,4 +1,5 @@
-//! One step of an aircraft with its derivatives with respect to state and action, and the derivative of the reward.
+//! One step of a simulated aircraft with its derivatives, for the analytic policy gradient. These are the derivatives of the next
+//! state with respect to state and action, and the derivative of the reward.
 
 use super::AnalyticRecipe;
 use greylag_control::Target;
@@ -10,9 +11,9 @@ use greylag_num::{Dual, Real};
 use greylag_physics::actuators::Actuators;
 use greylag_physics::{ActuatorState, Command, State};
 
-/// Number of variables of an aircraft: state (8), actuators (5), last commands (5), memory of the integrator (3).
+/// Number of variables of an aircraft: state (8), actuators (5), last two commands (5), last acceleration in the integrator (3).
 pub(super) const NUMBERS: usize = 8 + 5 + 5 + 3;
-/// Number of variables of an aircraft and of actions.
+/// Number of inputs of a step: the variables of an aircraft and the components of an action.
 pub(super) const INPUTS: usize = NUMBERS + ACTIONS;
 
 /// An aircraft with all variables that determine its next step.
@@ -24,15 +25,15 @@ pub(super) struct Aircraft<R = f64> {
     pub(super) memory: Memory<R>,
 }
 
-/// Derivatives of one step of an aircraft: of the next state with respect to the present state and the action, and of
-/// the reward with respect to the next state.
+/// Derivatives of one step of an aircraft. `next` has the derivatives of the next variables (row) with respect to the present
+/// variables and the action (column). `reward` has those of the reward with respect to the next variables.
 pub(super) struct Step {
     pub(super) next: [[f32; INPUTS]; NUMBERS],
     pub(super) reward: [f32; NUMBERS],
 }
 
-/// Variables that are perturbed for finite differences of the model's step. Each entry is the index of the variable
-/// and its perturbation (rad, m/s, rad/s, throttle 0..1, m/s²).
+/// Variables that are perturbed for finite differences of the model's step. Each entry has the index of a variable in an
+/// [`Aircraft`] and its perturbation (rad, m/s, rad/s, throttle 0..1, m/s²).
 const MOVED: [(usize, f32); 14] = [
     (0, 2e-3),
     (1, 2e-3),
@@ -50,7 +51,7 @@ const MOVED: [(usize, f32); 14] = [
     (20, 0.2),
 ];
 
-/// Model and settings that the threads share.
+/// The model and the settings, which all threads share.
 #[derive(Clone, Copy)]
 pub(super) struct Flyer<'a> {
     pub(super) model: &'a GreyBox,
@@ -85,7 +86,7 @@ impl<R: Real> Aircraft<R> {
         all
     }
 
-    /// Converts every variable by `f`, which also receives the index of the variable.
+    /// Applies `f` to the index and the value of every variable.
     pub(super) fn map<S: Real>(self, mut f: impl FnMut(usize, R) -> S) -> Aircraft<S> {
         let all = self.to_array();
         let mut at = |k: usize| f(k, all[k]);
@@ -117,7 +118,7 @@ impl<R: Real> Aircraft<R> {
 }
 
 impl Flyer<'_> {
-    /// The aircraft after a step, the derivatives of the step, and the reward of eq. (30).
+    /// Makes a step with `action`. Returns the aircraft after it, the derivatives of the step, and the reward of eq. (30).
     pub(super) fn slopes(
         &self,
         aircraft: &Aircraft,
@@ -132,7 +133,7 @@ impl Flyer<'_> {
         (after, Step { next, reward: self.reward(&after, target) }, earned)
     }
 
-    /// State and memory after a step. Writes their derivatives into `next`.
+    /// The aircraft with the state and the integrator's memory after a step. Writes the derivatives of these into `next`.
     fn motion(&self, aircraft: &Aircraft, next: &mut [[f32; INPUTS]; NUMBERS]) -> Aircraft {
         let at: Aircraft<Block> = aircraft.map(|place, x| {
             let mut lanes = Block::from_f64(x);
@@ -149,8 +150,7 @@ impl Flyer<'_> {
         let (before, all) = (at.to_array(), after.to_array());
         for row in (0..8).chain(18..21) {
             for (k, (place, _)) in MOVED.iter().enumerate() {
-                // the perturbation as rounded to single precision; zero for a memory that the integration scheme does
-                // not have
+                // the perturbation after rounding to single precision; it is zero if the integration scheme has no memory
                 let distance = before[*place].0[k + 1] - before[*place].0[0];
                 if distance != 0.0 {
                     next[row][*place] = (all[row].0[k + 1] - all[row].0[0]) / distance;
@@ -160,7 +160,7 @@ impl Flyer<'_> {
         after.map(|_, x| x.0[0].into())
     }
 
-    /// Actuators and last commands after a step. Writes their derivatives into `next`.
+    /// The actuators and the last two commands after a step. Writes their derivatives into `next`.
     fn actuation(
         &self,
         aircraft: &Aircraft,
@@ -195,9 +195,9 @@ impl Flyer<'_> {
         (plain.actuators, plain.previous)
     }
 
-    /// The derivative of the reward of eq. (30) with respect to the next state, with three changes. It is smoothed
-    /// near the target. Beyond a cap of the reward, a tenth of the derivative remains, because otherwise the gradient
-    /// would vanish. The derivative of the effort term is added.
+    /// The derivative of the reward of eq. (30) with respect to the next variables, with three changes. Near the target the
+    /// reward is smoothed. Where a term of the reward is at its cap, a tenth of its derivative is kept, because otherwise the
+    /// gradient would vanish. The derivative of the penalty on changes of the commands is added.
     pub(super) fn reward(&self, next: &Aircraft, target: &Target) -> [f32; NUMBERS] {
         let task = Task::PAPER;
         let slope = |x: f64, scale: f64, cap: f64| {
@@ -218,7 +218,8 @@ impl Flyer<'_> {
     }
 }
 
-/// For each observation, the index of the only variable on which it depends, and the derivative with respect to it.
+/// For each component of the observation, the index of the only variable of the aircraft on which it depends, and the derivative
+/// with respect to that variable.
 pub(super) fn observation_slopes() -> [(usize, f32); OBSERVATIONS] {
     type D = Dual<13>;
     let at = |k: usize| D::variable(0.1, k);

@@ -27,11 +27,10 @@ const CLIMB: f64 = 0.5;
 /// Standard deviation of the pseudo-measurement v = 0 at every step, m/s. With the process noise above, it returns the
 /// sideslip to zero within a few seconds. This bounds the drift, and sideslip in turns remains visible.
 const SIDEWAYS: f64 = 5.0;
-/// Standard deviations of the estimated angle of attack and sideslip without gusts, rad. With an exact attitude in calm
-/// air, α had 0.2° and β 0.3° to 0.5° with real ArduPlane, and 0.1° and 0.2° with real PX4
-/// (`tests/firmware/angles.py`). A pitch error adds to α, and a heading error adds to β. Two standard deviations are
-/// taken as 1° of pitch and 2° of heading: ArduPlane's errors were 0.7° and 0.9°, and a compass may have a larger
-/// error.
+/// Standard deviations of the estimated angle of attack and sideslip without gusts, rad. In calm air with an exact attitude
+/// they were 0.2° (α) and 0.3° to 0.5° (β) with real ArduPlane, and 0.1° and 0.2° with real PX4
+/// (`tests/firmware/angles.py`). A pitch error adds to α, and a heading error adds to β. Their standard deviations are
+/// assumed to be 0.5° and 1°. ArduPlane's errors were 0.7° in pitch and 0.9° in heading, and a compass may have a larger error.
 pub const DEVIATION: [f64; 2] = [0.71 * DEGREE, 1.12 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// Lowest airspeed at which the flow angles are estimated, m/s.
@@ -75,8 +74,8 @@ impl Default for AirData {
 }
 
 impl AirData {
-    /// Updates with a measurement `step` seconds after the last one. Returns α and β, rad; `None` below 3 m/s, or if
-    /// the measurement or the estimate is not finite. The estimate then restarts.
+    /// Updates with a measurement `step` seconds after the last one. Returns α and β, rad. If the airspeed is below 3 m/s,
+    /// or the measurement or the estimate is not finite, the result is `None` and the estimate restarts.
     pub fn update(&mut self, m: &Measured, step: f64) -> Option<[f64; 2]> {
         let needed =
             m.attitude.iter().chain(&m.rates).chain(&m.specific_force).chain([&m.airspeed]);
@@ -293,8 +292,7 @@ mod tests {
     #[test]
     fn the_angles_of_a_climbing_turn_with_sideslip_are_found() {
         // Every measurement is consistent with the motion, so the filter must converge to it with any weights. The
-        // pseudo-measurement of zero sideslip biases the sideslip by the fraction (0.05 / 5)². 0.03° is a fiftieth of
-        // the error that the LQI tolerates.
+        // pseudo-measurement of zero sideslip reduces the sideslip by the fraction (0.05 / 5)².
         for (air, attitude, turn) in
             [([21.0, 1.5, 2.0], [0.6, 0.25], 0.35), ([19.0, -2.0, 0.5], [-0.9, -0.1], -0.6)]
         {
@@ -370,7 +368,7 @@ mod tests {
 
     #[test]
     fn a_glitch_moves_the_angles_by_a_tenth_of_a_degree() {
-        // An outlier of 40 m/s in the climb rate. Its innovation is limited to 1.5 m/s, and the gain is about 1/50.
+        // The climb rate has an outlier of 40 m/s. Its innovation is limited to 1.5 m/s, and the gain is about 1/50.
         let mut filter = AirData::default();
         let before = (0..400).filter_map(|_| filter.update(&level(), 0.01)).last().unwrap();
         let after = filter.update(&Measured { climb: 40.0, ..level() }, 0.01).unwrap();

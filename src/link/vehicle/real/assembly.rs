@@ -1,4 +1,4 @@
-//! Assembles state frames from separate streams. Each attitude message completes a frame.
+//! Assembles state frames from a flight controller's message streams. Each attitude message completes a state frame.
 
 use std::time::Duration;
 
@@ -14,16 +14,16 @@ use greylag_physics::{Command, Controls, State, Time};
 
 /// Nominal time between states, µs.
 const PERIOD_US: u64 = 10_000;
-/// Step back of the clock, ms, above which the controller has restarted. A smaller step back is a late datagram.
+/// Step back of the controller's clock (ms) above which it counts as restarted. After a smaller one the message came late.
 const RESTART_MS: i32 = 1000;
-/// Age above which a part of the state is stale.
+/// Age of a measurement above which it is no longer used.
 const STALE: Duration = Duration::from_millis(300);
-/// Largest number of actuator-model steps after a gap: 0.2 s, longer than any transient.
+/// Largest number of steps of the actuator model after a gap: 0.2 s, after which the actuators have settled.
 const CATCH_UP: u64 = 20;
-/// The last value of a stream with its arrival time (host clock); `None` before the first value.
+/// The last value of a stream with its arrival time by this computer's clock; `None` before the first value.
 type Heard<T> = Option<(Duration, T)>;
 
-/// The latest values of a controller's streams.
+/// The latest values of a flight controller's streams, and the state frame made from them.
 #[derive(Clone, Debug)]
 pub(super) struct Assembly {
     figures: ActuatorFigures,
@@ -34,7 +34,7 @@ pub(super) struct Assembly {
     incidence: Heard<[f64; 2]>,
     estimator: AirData,
     gusts: Gusts,
-    /// Whether a velocity was received since the estimator's last update.
+    /// Whether a velocity over ground has arrived since the last update of `estimator`.
     new_velocity: bool,
     actuators: Actuators,
     boot_ms: Option<u32>,
@@ -89,7 +89,7 @@ impl Assembly {
         }
     }
 
-    /// Processes a measurement. An attitude completes a state. `command` is the actuator command since the last state.
+    /// Stores the measurement in `message`. An attitude completes a state, which is returned. `command` acted since the last one.
     pub(super) fn take(
         &mut self,
         host: Duration,
@@ -152,9 +152,9 @@ impl Assembly {
         }
         self.fill_force(host, &mut next);
         let climb = self.fill_air(host, &mut next);
-        // stale parts do not count as frozen, because they are already a fault
+        // a state with faults, such as an old measurement, is not tested for frozen sensors
         if self.stands_still(quaternion, rates) && next.faults.is_empty() {
-            // the estimator would change the angles, and so hide from the pilot that all sensors are frozen
+            // the estimator would change the angles, and the pilot could not see that all sensors are frozen
             (next.state.alpha, next.state.beta) = (self.last.state.alpha, self.last.state.beta);
         } else {
             self.fill_incidence(host, &mut next, climb, step.as_secs_f64());
@@ -169,7 +169,7 @@ impl Assembly {
         Some(next)
     }
 
-    /// Whether every sensor value equals the value of the last state bit by bit.
+    /// Whether every sensor value equals that of the last state bit by bit. Stores the present values.
     fn stands_still(&mut self, quaternion: [f64; 4], rates: [f64; 3]) -> bool {
         let force = self.specific_force.map_or([0.0; 3], |(_, force)| force);
         let air = self.air.map_or([0.0; 3], |(_, air)| air);
@@ -186,7 +186,7 @@ impl Assembly {
         }
     }
 
-    /// Fills in true airspeed and altitude. Returns the climb rate, m/s; NaN if it is stale.
+    /// Sets true airspeed and altitude in `next`. Returns the climb rate, m/s; NaN if the air data are too old.
     fn fill_air(&self, host: Duration, next: &mut Telemetry) -> f64 {
         let Some([equivalent, altitude, climb]) = fresh(self.air, host) else {
             next.faults.insert(Faults::LATE_AIR);
@@ -220,8 +220,8 @@ impl Assembly {
         };
         let estimated = self.estimator.update(&measured, step);
         let whole = !next.faults.contains(Faults::SPECIFIC_FORCE);
-        // ArduPilot derives AOA_SSA from its wind estimate, not from vanes. With real ArduPlane, the standard deviation
-        // of its sideslip error was 1.7°, and that of this estimate was 0.4°.
+        // ArduPilot's reported angles (AOA_SSA) come from its wind estimate, not from vanes. With ArduPlane, the standard
+        // deviation of their sideslip error was 1.7°. That of `estimator` was 0.4°, so its angles are preferred.
         match estimated.filter(|_| whole).or(reported) {
             Some([alpha, beta]) => (next.state.alpha, next.state.beta) = (alpha, beta),
             None => next.faults.insert(Faults::INCIDENCE),
@@ -233,7 +233,7 @@ impl Assembly {
         next.incidence_sd = air_data::DEVIATION.map(|sd| sd.hypot(gust));
     }
 
-    /// Vehicle time, and its order relative to the last state. The 32-bit count of milliseconds wraps after 49 days.
+    /// The vehicle time of a state and its order relative to the last one. The 32-bit count of milliseconds wraps after 49 days.
     fn order(&mut self, boot_ms: u32) -> (Time, Order) {
         let first = Time::from_micros(1000 * u64::from(boot_ms));
         let Some(before) = self.boot_ms else {
@@ -347,7 +347,7 @@ mod tests {
         assert!(assembly.take(host, &attitude(10), &Command::IDLE).is_none());
         fed(&mut assembly, host);
         let state = assembly.take(host, &attitude(20), &Command::IDLE).unwrap();
-        // √(1.225 / 1.0)
+        // true airspeed is √(1.225 / 1.0) times the equivalent airspeed
         assert!((state.state.airspeed - 20.0 * 1.106_797).abs() < 1e-4);
         assert!(state.faults.is_empty(), "{}", state.faults);
         let late = host + STALE + Duration::from_millis(1);
@@ -390,7 +390,7 @@ mod tests {
         assembly.take(host, &position(91.0), &Command::IDLE);
         let state = assembly.take(host, &attitude(20), &Command::IDLE).unwrap();
         assert!(state.position[0].is_nan() && state.velocity[0].is_nan());
-        // √(1.225 / 1.156), with the density of the standard atmosphere at 600 m.
+        // the factor is √(1.225 / 1.156) with the density of the standard atmosphere at 600 m
         assert!((state.state.airspeed - 20.588).abs() < 0.005, "{}", state.state.airspeed);
         assembly.take(host, &position(45.0), &Command::IDLE);
         let state = assembly.take(host, &attitude(30), &Command::IDLE).unwrap();

@@ -1,18 +1,18 @@
 //! Rate limit on the attitude that is commanded to a flight controller.
 //!
-//! A step of bank from one side to the other saturates a flight controller's loops. The pitch error then reaches 20°. A
-//! ramp that the loops can follow keeps the attitude inside the envelope.
+//! A step of the commanded bank from one side to the other saturates a flight controller's loops, and the pitch error
+//! reaches 20°. A ramp that the loops can follow keeps the attitude inside the envelope.
 
 use greylag_physics::Time;
 
-/// Largest rate of the commanded roll and pitch, rad/s. It is below the limits of flight controllers: PX4's defaults
-/// are 70°/s in roll and 60°/s in pitch; ArduPilot's autotune takes 75°/s.
+/// Largest rates of the commanded roll and pitch, rad/s. They are below the rate limits of flight controllers: 70°/s in roll
+/// and 60°/s in pitch by default in PX4, 75°/s after an autotune in ArduPilot.
 const RATE: [f64; 2] = [45.0 * DEGREE, 20.0 * DEGREE];
-/// Longest time step of the ramp, s. A longer gap between two states counts as this long.
+/// Longest time step of the ramp, s. A longer time since the last command counts as this long.
 const GAP_S: f64 = 0.1;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// The ramp, with the roll and pitch (rad) that were last commanded.
+/// The ramp. It stores the last commanded roll and pitch (rad) with their time.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AttitudeRamp {
     last: Option<(Time, [f64; 2])>,
@@ -24,14 +24,14 @@ impl AttitudeRamp {
         self.last = None;
     }
 
-    /// The roll and pitch to command at `now` on the ramp to `wanted`, rad. After a reset the ramp starts at the
-    /// measured attitude `seen`.
+    /// Returns the roll and pitch (rad) to command at `now`, on the ramp to the target attitude `wanted`. After a reset the ramp
+    /// starts at the measured attitude `seen`.
     pub(super) fn command(&mut self, now: Time, wanted: [f64; 2], seen: [f64; 2]) -> [f64; 2] {
         let (before, from) = self.last.unwrap_or((now, seen));
         let dt = now.since(before).as_secs_f64().min(GAP_S);
         let ramped = std::array::from_fn(|axis| {
             let most = RATE[axis] * dt;
-            // a ramp cannot start from a NaN attitude
+            // no ramp can start from a NaN, so the target is commanded at once
             if from[axis].is_finite() {
                 wanted[axis].clamp(from[axis] - most, from[axis] + most)
             } else {

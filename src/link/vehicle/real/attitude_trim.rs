@@ -4,7 +4,7 @@
 //! elevator feed-forward that does not fit the aircraft leave a pitch error of up to 9° for half a minute.
 //!
 //! The error is integrated slowly and within narrow bounds, and only while the setpoint is constant and nearly reached.
-//! This removes constant errors and leaves transients to the flight controller.
+//! The correction therefore removes constant errors and leaves transients to the flight controller.
 
 use greylag_physics::Time;
 
@@ -56,7 +56,7 @@ impl AttitudeTrim {
             if (self.found_at[axis] - wanted[axis]).abs() > ANOTHER {
                 *added = 0.0;
             }
-            // error of the flight controller relative to what it was sent, including the correction
+            // difference between the attitude that was sent to the flight controller and the measured attitude
             let left = (wanted[axis] + *added - seen[axis]).abs();
             if settled && dt <= GAP_S && left <= NEAR {
                 *added = (*added + (wanted[axis] - seen[axis]) * dt / TIME_S).clamp(-MOST, MOST);
@@ -76,9 +76,9 @@ fn far(a: [f64; 2], b: [f64; 2], by: f64) -> bool {
 mod tests {
     use super::*;
 
-    /// Roll error at each tick of 20 s of flight, rad. The flight controller has a time constant of half a second and a
-    /// constant error of `error` (rad). `wanted` is the roll setpoint (rad) as a function of time (s). The flight
-    /// starts at the setpoint.
+    /// Roll error at each tick of a simulated flight of 20 s, rad. The flight controller has a time constant of half a
+    /// second and a constant error of `error` (rad). `wanted` is the roll setpoint (rad) as a function of time (s). The
+    /// flight starts at the setpoint.
     fn flown(error: f64, wanted: impl Fn(f64) -> f64) -> Vec<f64> {
         let (mut trim, mut roll) = (AttitudeTrim::default(), wanted(0.0));
         (0..2000)
@@ -116,7 +116,7 @@ mod tests {
         }
     }
 
-    /// A controller that reaches 95 % of its command, in turns to both sides.
+    /// The simulated flight controller reaches 95 % of the commanded roll, first in a right turn and then in a left turn.
     #[test]
     fn a_turn_that_is_reversed_is_trimmed_anew() {
         for ramp_s in [0.01, 9.0] {

@@ -1,4 +1,6 @@
-//! Delay of the surface loop from the flight controller's parameters, and the remaining delay margin.
+//! Delay in the control loop through the flight controller, from the controller's parameters, and the remaining delay margin.
+//!
+//! The delay margin is the smallest delay at which the loop of controller, surfaces and aircraft oscillates.
 
 use std::fmt;
 use std::time::Duration;
@@ -8,14 +10,14 @@ use super::profile::{Authority, Stack};
 
 /// Delay of a second-order Butterworth low-pass at low frequencies, in periods of its cut-off frequency: √2 / 2π.
 const LOW_PASS: f64 = 0.225;
-/// Sampling periods of the channels, s. ArduPilot samples its channels every 20 ms. PX4 takes each MANUAL_CONTROL, one
-/// per 10 ms.
+/// Sampling periods of the stick channels, s. ArduPilot samples its RC channels every 20 ms. PX4 uses each MANUAL_CONTROL
+/// message, one per 10 ms.
 const CHANNELS_S: [f64; 2] = [0.02, 0.01];
-/// Remaining delay margin below which a warning is given, s. It covers the link and other delays that are known only
-/// roughly.
+/// Remaining delay margin below which a warning is given, s. It leaves room for the link and other delays that are not
+/// computed.
 const SCARCE_S: f64 = 0.015;
 
-/// Contributions to the delay of the loop, s.
+/// Contributions of the flight controller to the delay of the loop, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Delays {
     stack: Stack,
@@ -55,7 +57,8 @@ impl Real {
         self.bears = least;
     }
 
-    /// The contributions to the delay; `None` before the parameters are read, and if attitudes are commanded.
+    /// The flight controller's contributions to the delay. `None` before its parameters are read, and if the companion commands
+    /// attitudes.
     pub fn delays(&self) -> Option<Delays> {
         if self.profile.authority == Authority::Attitude {
             return None;
@@ -74,7 +77,7 @@ impl Real {
         Some(Delays { stack, gyros: (hz, low_pass), cycle, channels_s })
     }
 
-    /// Remaining delay margin, s, and a text on its contributions; `None` if it is unknown.
+    /// Remaining delay margin, s, with a text on the contributions; `None` if it is unknown.
     fn left(&self) -> Option<(f64, String)> {
         let (delays, bears) = (self.delays()?, self.bears?.as_secs_f64());
         let left = bears - delays.sum_s();
@@ -92,8 +95,8 @@ impl Real {
         self.left().map(|(_, words)| words)
     }
 
-    /// Reason for which the delay forbids control of the surfaces, with the remedy; `None` if the margin is positive or
-    /// unknown.
+    /// Reason for which the companion must not command the surfaces, with the remedy; `None` if the remaining delay margin is
+    /// positive or unknown.
     pub fn delay_obstacle(&self) -> Option<String> {
         let (left, words) = self.left()?;
         (left <= 0.0).then(|| {

@@ -1,4 +1,5 @@
-//! Periodic duties: heartbeat, watchdog, and requests of streams, parameters and modes.
+//! Periodic tasks of the link to a flight controller: heartbeat, watchdog, and requests of streams, parameters and modes. While
+//! the companion has control authority, the flight controller executes its commands.
 
 use std::time::Duration;
 
@@ -11,14 +12,15 @@ use crate::wire::controller as wire;
 const HEARTBEAT: Duration = Duration::from_secs(1);
 /// Interval between latency measurements.
 const TIME_SYNC: Duration = Duration::from_millis(200);
-/// Age of the newest state at which control authority is returned.
+/// Largest age of the newest state. If the state is older, control authority is returned to the flight controller.
 const BLIND: Duration = Duration::from_millis(300);
-/// Silence of the companion after which a flight controller's own failsafe acts (COM_RC_LOSS_T, RC_OVERRIDE_TIME, …).
+/// Time without messages of the companion after which the flight controller's own failsafe acts (COM_RC_LOSS_T,
+/// RC_OVERRIDE_TIME, …).
 const DEAD: Duration = Duration::from_millis(500);
 
 impl Real {
-    /// Frames other than replies that are due at `host`: heartbeat, requests, and the return of control authority.
-    /// `None` without such frames.
+    /// Returns the frames that are due at `host` without being replies: heartbeat, requests, and the return of control
+    /// authority. `None` if there are none.
     pub fn due(&mut self, host: Duration) -> Option<Vec<u8>> {
         let mut bytes = Vec::new();
         self.now = host;
@@ -35,8 +37,8 @@ impl Real {
         (!bytes.is_empty()).then_some(bytes)
     }
 
-    /// See [`crate::vehicle::Vehicle::excuse`]. After a stall longer than 0.5 s the flight controller's own failsafe is
-    /// active. Control authority is then returned.
+    /// Handles a stall of this computer for the time `missed`, see [`crate::vehicle::Vehicle::excuse`]. After a stall longer
+    /// than 0.5 s the flight controller's own failsafe is active. Control authority is then returned.
     pub fn excuse(&mut self, missed: Duration) {
         if self.engagement.steers() && missed > DEAD {
             self.hand_back(format!("this computer stalled for {:.1} s", missed.as_secs_f64()));
@@ -48,13 +50,15 @@ impl Real {
         self.pulse.rest();
     }
 
-    /// Returns control authority if heartbeats, states or cycles are missing, or if engagement has timed out.
+    /// Returns control authority to the flight controller if its heartbeats or states are missing, if control cycles of this
+    /// computer are missing or too many frames are lost while surfaces are commanded, or if the flight controller does not enter
+    /// the requested mode in time.
     fn watch(&mut self, host: Duration) {
         if !self.engagement.steers() {
             self.pulse.rest();
             return self.remind(host);
         }
-        // a controller that tracks an attitude tolerates slow commands
+        // a flight controller that tracks commanded attitudes tolerates slow commands
         let surfaces = self.profile.authority == Authority::Surfaces;
         let scarce = self.pulse.cycle(host, self.survey.frames()).filter(|_| surfaces);
         let age = |at: Duration| host.saturating_sub(at);
@@ -74,7 +78,7 @@ impl Real {
         }
     }
 
-    /// Reports that the return of control authority is not confirmed.
+    /// Warns if the flight controller has not confirmed the return of control authority.
     fn remind(&mut self, host: Duration) {
         if self.engagement.unconfirmed(host) {
             let (steered, hold) =
@@ -88,7 +92,7 @@ impl Real {
         }
     }
 
-    /// Requests streams and parameters, and measures the latency.
+    /// Requests message streams that are too slow and parameters that are not yet known, and measures the latency.
     fn ask(&mut self, host: Duration, to: Source, bytes: &mut Vec<u8>) {
         let first = self.survey.is_new() && self.survey.messages().count() <= 1;
         if self.survey.turn(host) || first {
@@ -122,7 +126,7 @@ impl Real {
         let message = wire::set_mode(to, mode.main, mode.sub);
         bytes.extend(self.write(&message));
         if !steer && (stack, self.profile.authority) == (Stack::Ardupilot, Authority::Surfaces) {
-            // the channels are returned to the RC transmitter
+            // control of the RC channels is returned to the RC transmitter
             let message = wire::channels_override(to, [0; 3]);
             bytes.extend(self.write(&message));
         }

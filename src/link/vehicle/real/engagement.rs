@@ -1,8 +1,8 @@
-//! Control authority: its request from the flight controller, and its return.
+//! Engagement: how the companion requests control authority from the flight controller ("controller") and returns it.
 //!
-//! The mode in HEARTBEAT or CURRENT_MODE shows whether the companion has control authority. COMMAND_ACK does not show
-//! it: PX4 sends two for a mode request, the first of which is always ACCEPTED, and the link may lose either. The
-//! "steered mode" is the mode in which the flight controller executes the companion's commands.
+//! The "steered mode" is the controller's mode in which it executes the companion's commands. The companion has control
+//! authority when HEARTBEAT or CURRENT_MODE show this mode. COMMAND_ACK does not suffice: PX4 sends two replies to a mode
+//! request, the first is always ACCEPTED, and the link may lose either.
 
 use std::time::Duration;
 
@@ -10,54 +10,55 @@ use super::profile::{Authority, Stack};
 
 /// Interval at which a mode request is repeated.
 pub(super) const ASK_AGAIN: Duration = Duration::from_millis(250);
-/// Timeout from the first possible request until the controller shows the mode.
+/// Longest time from the first mode request until the controller shows the steered mode.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// Time after which an unconfirmed return of control authority is reported. Two heartbeats are due in this time.
+/// Time after which it is reported that the controller has not confirmed the return of control authority. Two heartbeats are
+/// due in this time.
 const UNCONFIRMED: Duration = Duration::from_secs(2);
-/// Time after engagement in which another mode is ignored. HEARTBEAT and CURRENT_MODE may arrive in the wrong order.
+/// Time after engagement for which another mode is ignored, because HEARTBEAT and CURRENT_MODE may arrive in the wrong order.
 const GRACE: Duration = Duration::from_millis(100);
 
 /// Phase of the engagement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Phase {
-    /// The controller or its pilot flies.
+    /// The controller or its remote pilot flies.
     Idle,
-    /// The steered mode is being requested. Commands are already streamed, because the controller requires a stream
-    /// before the mode.
+    /// The steered mode is requested. The companion already sends commands, because the controller accepts the mode only while
+    /// it receives them.
     Entering { since: Duration, asked: Option<Duration> },
     /// The companion has control authority.
     Engaged { since: Duration },
-    /// The controller's hold mode is requested until the controller shows another mode than the steered one.
+    /// The controller's hold mode is requested, until the controller shows a mode other than the steered one.
     Releasing { since: Option<Duration>, asked: Option<Duration> },
 }
 
-/// Event that follows from a mode shown by the controller.
+/// What a mode that the controller shows means for the engagement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shown {
     /// No change of the phase.
     Nothing,
     /// The companion has control authority from now on.
     Engaged,
-    /// The controller, or its pilot, has taken control.
+    /// The controller or its remote pilot has taken control.
     Taken,
     /// The controller has confirmed the return.
     Confirmed,
 }
 
-/// The phase of the engagement, with the controller's replies.
+/// The phase of the engagement, and the controller's replies.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Engagement {
     pub(super) phase: Phase,
     /// Time for which commands are streamed before the first mode request.
     lead: Duration,
-    /// The last MAV_RESULT other than ACCEPTED.
+    /// The last MAV_RESULT that refused a mode request in this engagement.
     refused: Option<u8>,
-    /// Whether any mode request was accepted.
+    /// Whether a mode request was accepted in this engagement.
     accepted: bool,
-    /// Whether engagement is blocked. It is blocked after a return of control authority, until the companion has
-    /// stopped demanding it once.
+    /// Whether engagement is blocked. It is blocked from the loss or return of control authority until the companion is not
+    /// armed for at least one tick.
     barred: bool,
-    /// Whether the unconfirmed return was reported.
+    /// Whether it was reported that the return is not confirmed.
     reminded: bool,
 }
 
@@ -83,7 +84,7 @@ impl Engagement {
         matches!(self.phase, Phase::Engaged { .. })
     }
 
-    /// Starts engagement, unless it is blocked or has started already. Returns whether it starts now.
+    /// Starts engagement at `host`, unless it is blocked or has started already. Returns whether it starts now.
     pub(super) fn begin(&mut self, host: Duration) -> bool {
         let begins = !self.barred && !self.steers();
         if begins {
@@ -93,7 +94,8 @@ impl Engagement {
         begins
     }
 
-    /// Registers that control authority is no longer demanded, and releases it.
+    /// To be called if the companion does not demand control authority. Ends the block, and begins the return of control
+    /// authority if the companion has or requests it.
     pub(super) fn rest(&mut self) {
         self.barred = false;
         if self.steers() {
@@ -101,7 +103,7 @@ impl Engagement {
         }
     }
 
-    /// Returns control authority. Engagement is blocked until the companion has stopped demanding it once.
+    /// Begins the return of control authority. Engagement is blocked until [`rest`](Engagement::rest) is called.
     pub(super) fn hand_back(&mut self) {
         self.barred = true;
         self.release();
@@ -112,20 +114,20 @@ impl Engagement {
         self.reminded = false;
     }
 
-    /// Registers the MAV_RESULT of a mode request. No reply engages by itself.
+    /// Stores the MAV_RESULT of a mode request. An acceptance alone does not engage.
     pub(super) fn answered(&mut self, result: u8) {
         match (self.phase, result) {
             (Phase::Entering { .. }, 0) => self.accepted = true,
-            // 5 is MAV_RESULT_IN_PROGRESS
+            // 5 (MAV_RESULT_IN_PROGRESS) is no refusal
             (Phase::Entering { .. }, 1..=4 | 6..) => self.refused = Some(result),
             _ => {}
         }
     }
 
-    /// Registers whether the controller shows the steered mode.
+    /// Changes the phase according to a mode that the controller shows. `steered` states whether it is the steered mode.
     pub(super) fn shown(&mut self, host: Duration, steered: bool) -> Shown {
         match self.phase {
-            // a mode that was active before the first request was chosen by the controller's pilot
+            // if the steered mode was active before the first request, the remote pilot chose it
             Phase::Entering { asked: Some(_), .. } if steered => {
                 self.phase = Phase::Engaged { since: host };
                 Shown::Engaged
@@ -143,7 +145,7 @@ impl Engagement {
         }
     }
 
-    /// Reason for which engagement has timed out; `None` before the timeout.
+    /// The likely reason for which the controller does not show the steered mode; `None` before the timeout.
     pub(super) fn overdue(
         &self,
         host: Duration,
@@ -163,7 +165,8 @@ impl Engagement {
         })
     }
 
-    /// Whether an unconfirmed return of control authority is to be reported now. It is reported at most once.
+    /// Whether it is to be reported now that the controller has not confirmed the return. The result is `true` at most once per
+    /// return.
     pub(super) fn unconfirmed(&mut self, host: Duration) -> bool {
         let Phase::Releasing { since: Some(since), .. } = self.phase else { return false };
         let late = host.saturating_sub(since) > UNCONFIRMED && !self.reminded;
@@ -171,8 +174,8 @@ impl Engagement {
         late
     }
 
-    /// The mode request that is due at `host`: `true` for the steered mode, `false` for the controller's hold mode,
-    /// `None` without a request.
+    /// The mode request that is due at `host`: `true` for the steered mode, `false` for the controller's hold mode, `None` if no
+    /// request is due.
     pub(super) fn request(&mut self, host: Duration) -> Option<bool> {
         let due =
             |asked: Option<Duration>| asked.is_none_or(|at| host.saturating_sub(at) >= ASK_AGAIN);
@@ -193,7 +196,7 @@ impl Engagement {
     }
 }
 
-/// Likely cause of a refusal of the steered mode.
+/// Likely cause for which the controller refused the steered mode with this MAV_RESULT.
 fn refusal(result: u8, stack: Stack, authority: Authority) -> String {
     match (result, stack, authority) {
         (1, Stack::Px4, Authority::Surfaces) => {
@@ -233,7 +236,7 @@ mod tests {
         engagement.begin(ms(0));
         assert_eq!(engagement.request(ms(490)), None);
         assert_eq!(engagement.request(ms(500)), Some(true));
-        // PX4's two replies: from its receiver, then from its commander.
+        // the two replies of PX4: the first comes from its MAVLink receiver, the second from its commander
         engagement.answered(0);
         engagement.answered(1);
         assert!(matches!(engagement.phase, Phase::Entering { .. }));
@@ -259,7 +262,7 @@ mod tests {
         engagement.request(ms(0));
         engagement.shown(ms(10), true);
         engagement.hand_back();
-        // One minute without a reply: four requests per second.
+        // one minute without a reply, with four requests per second
         let asked = (0..6000).filter(|i| engagement.request(ms(10 * i)) == Some(false)).count();
         assert_eq!(asked, 240);
         assert!(engagement.unconfirmed(ms(60_000)) && !engagement.unconfirmed(ms(60_010)));
@@ -277,7 +280,7 @@ mod tests {
             engagement.request(ms(0));
             assert_eq!(engagement.shown(ms(10), true), Shown::Engaged);
             assert_eq!(engagement.shown(ms(10 + late), false), shown);
-            // the controller's pilot has control: engagement is blocked until it was not demanded once
+            // engagement cannot begin: it is active still, or blocked because the remote pilot has control
             assert!(!engagement.begin(ms(200)));
             assert_eq!(engagement.is_engaged(), shown == Shown::Nothing);
             engagement.rest();
@@ -298,7 +301,7 @@ mod tests {
         ] {
             let mut engagement = Engagement::new(LEAD);
             engagement.begin(ms(0));
-            // MAV_RESULT_IN_PROGRESS (5) is no refusal.
+            // MAV_RESULT_IN_PROGRESS (5) does not replace the refusal
             [result, 5].into_iter().for_each(|result| engagement.answered(result));
             let said = engagement.overdue(ms(3501), stack, authority).unwrap();
             assert!(said.contains(words), "{said}");

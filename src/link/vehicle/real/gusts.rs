@@ -9,14 +9,14 @@
 const WIND_S: f64 = 10.0;
 /// Longest averaging time of the mean square of the gusts, s.
 const AVERAGED_S: f64 = 60.0;
-/// Initial intensity, m/s (moderate turbulence), and the averaging time with which it is weighted, s.
+/// Initial intensity, m/s (moderate turbulence). It has the weight of a measurement that lasted `SUPPOSED_S`, s.
 const SUPPOSED_MPS: f64 = 1.5;
 const SUPPOSED_S: f64 = 20.0;
 /// Scale length of gusts at altitude, m (MIL-F-8785C above 2000 ft).
 const LENGTH_M: f64 = 533.0;
-/// Factor on the gusts in the standard deviation of the flow angles. A gust can last for half a minute, so it does not
-/// average out, and the band of two standard deviations must cover the largest gust of a flight: 3.5 standard
-/// deviations.
+/// Factor on the gusts' standard deviation. The monitor's band has a half width of two of the resulting standard
+/// deviations. With this factor it covers the largest gust of a flight, 3.5 standard deviations of the gusts. A gust can
+/// last for half a minute, so it does not average out.
 const LASTING: f64 = 1.75;
 /// Lowest airspeed at which gusts are estimated, and lowest divisor of a gust, m/s.
 const SLOWEST_MPS: f64 = 3.0;
@@ -78,8 +78,8 @@ impl Gusts {
         self.power += (whole - self.power) * dt / self.averaged;
     }
 
-    /// Standard deviation that gusts add to an angle of attack or sideslip estimated without vanes, rad. Bands are two
-    /// standard deviations wide to each side.
+    /// Standard deviation, rad, by which gusts widen the monitor's band of an angle of attack or sideslip that is estimated
+    /// without vanes. It includes the factor `LASTING`.
     pub fn incidence(&self, airspeed: f64) -> f64 {
         LASTING * self.deviation() / airspeed.max(SLOWEST_MPS)
     }

@@ -1,4 +1,5 @@
-//! Handling of received frames: identification of the controller, its modes and its states.
+//! Handles the frames that the companion (this program) receives from the flight controller. They identify the flight controller
+//! and contain its mode and its state.
 
 use std::time::Duration;
 
@@ -18,7 +19,7 @@ use crate::wire::controller::ControllerMessage;
 const NO_AUTOPILOT: u8 = 8;
 
 impl Real {
-    /// Handles received bytes, see [`crate::vehicle::Vehicle::handle`].
+    /// Handles the bytes `bytes` from `peer`, see [`crate::vehicle::Vehicle::handle`]. Passes each complete state to `deliver`.
     pub fn handle(
         &mut self,
         host: Duration,
@@ -60,7 +61,7 @@ impl Real {
                     self.survey.restart(host, id);
                 }
             }
-            // the companion's own overrides may be reported as an RC transmitter
+            // while the companion has control, its own overrides may be reported as a radio-control receiver
             ControllerMessage::Receiver { alive } if !self.engagement.steers() => {
                 self.radio = Some(alive);
             }
@@ -71,7 +72,7 @@ impl Real {
             }
             ControllerMessage::TimeSync { ours } => {
                 let sent = u64::try_from(ours).ok().map(Duration::from_nanos);
-                // a reply to another program contains the time of that program's clock
+                // a reply that is meant for another program contains a time of that program's clock
                 let trip = sent.and_then(|sent| host.checked_sub(sent));
                 if let Some(trip) = trip.filter(|trip| *trip <= GONE) {
                     self.survey.trip(trip);
@@ -120,7 +121,7 @@ impl Real {
         }
     }
 
-    /// Handles a mode that the controller shows.
+    /// Handles the mode `custom_mode` that the controller reports. The mode shows whether the companion has control authority.
     fn shown(&mut self, host: Duration, custom_mode: u32) {
         let steered = self.profile.stack.steered(self.profile.authority);
         let name = steered.name;
@@ -140,15 +141,15 @@ impl Real {
         }
     }
 
-    /// Whether a reply is addressed to this companion. Old firmware leaves the target zero.
+    /// Whether a reply to `to` is meant for this companion. Old firmware sets the target to zero.
     fn is_us(&self, to: Source) -> bool {
         let system = self.system().unwrap_or(0);
         matches!(to, Source { system: 0, component: 0 })
             || to == Source { system, component: ONBOARD }
     }
 
-    /// Restarts with a controller that appears for the first time or again. Its parameters and channel directions are
-    /// then unknown. Engagement is refused until they are read.
+    /// Resets the link for a flight controller that appears for the first time or again. Its parameters and channel directions
+    /// are then unknown. Until they have been read, the companion refuses to take control.
     fn meet(&mut self, system: u8, autopilot: u8) {
         if self.engagement.steers() {
             self.hand_back("no heartbeat of the controller for 3 s".into());

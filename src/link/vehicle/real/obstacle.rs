@@ -1,17 +1,17 @@
-//! Conditions that prevent engagement, as texts with their remedies.
+//! Conditions that prevent the companion from taking control of a flight controller, as texts with their remedies.
 
 use super::profile::{Authority, Stack};
 use super::{ENOUGH, GONE, Real};
 use crate::framing::Source;
 
-/// Text for a controller that requires signatures while this companion does not sign.
+/// Text for a flight controller that signs its frames and ignores unsigned ones, while this companion does not sign.
 const SHUT_OUT: &str = "the controller signs its frames and ignores ours, which carry no right \
                         signature: give its key with --sign and add --sign-vehicle";
 
 impl Real {
-    /// Warning about an RC transmitter while surfaces are commanded; `None` without one. When the overrides end,
-    /// ArduPlane returns to the transmitter's sticks in MANUAL. It leaves MANUAL only by its ground-station failsafe.
-    /// The companion acts as that ground station.
+    /// Warning for ArduPilot with a bound RC transmitter, if surfaces are commanded; `None` in all other cases. If the companion
+    /// fails, its overrides of the transmitter end, and ArduPlane flies on the transmitter's sticks in MANUAL. It leaves
+    /// MANUAL only by its ground-station failsafe, for which the companion is the ground station.
     pub fn radio_warning(&self) -> Option<String> {
         let by_channels =
             (self.profile.stack, self.profile.authority) == (Stack::Ardupilot, Authority::Surfaces);
@@ -25,17 +25,18 @@ impl Real {
         })
     }
 
-    /// Whether the controller signs its frames and has not replied to any parameter request.
+    /// Whether the flight controller signs its frames and has not replied to any parameter request.
     pub fn is_shut_out(&self) -> bool {
         self.signs && self.parameters.is_silent()
     }
 
-    /// Reason for which the controller refused the stream `id`, with the remedy; `None` if it did not refuse.
+    /// Reason for which the flight controller refused to send the message `id` periodically, with the remedy; `None` if it did
+    /// not refuse.
     pub fn denial(&self, id: u32) -> Option<String> {
         self.requests.words(self.profile.stack).filter(|_| self.requests.is_denied(id))
     }
 
-    /// Reason for which control authority cannot be taken now, with the remedy; `None` if it can be taken.
+    /// Reason for which the companion cannot take control now, with the remedy; `None` if it can.
     pub fn obstacle(&self) -> Option<String> {
         let Some(controller) = self.controller else {
             return Some(
@@ -65,11 +66,12 @@ impl Real {
             .or_else(|| self.thin_stream())
     }
 
-    /// Reason for a refusal, if another component of the aircraft's system sends heartbeats.
+    /// Reason for which the companion cannot take control while another component with the aircraft's system id sends
+    /// heartbeats; `None` without such a component. It applies to ArduPilot with a bound transmitter and commanded surfaces.
     ///
-    /// ArduPlane identifies its ground station by the system id alone, and this companion uses the aircraft's system
-    /// id. If the companion fails, heartbeats of another component keep the ground-station failsafe from acting. The
-    /// aircraft would then stay on the radio's sticks.
+    /// ArduPlane identifies its ground station by the system id alone, and the companion uses the aircraft's system id. If the
+    /// companion failed, the other component's heartbeats would prevent the ground-station failsafe. The aircraft would stay
+    /// on the transmitter's sticks.
     fn hidden_death(&self) -> Option<String> {
         let by_channels =
             (self.profile.stack, self.profile.authority) == (Stack::Ardupilot, Authority::Surfaces);
@@ -83,7 +85,7 @@ impl Real {
         ))
     }
 
-    /// Text about a required stream whose rate is too low; `None` without such a stream.
+    /// Text about a required periodic message whose rate is too low; `None` if all rates suffice.
     fn thin_stream(&self) -> Option<String> {
         let thin = self
             .profile

@@ -1,6 +1,7 @@
-//! The flight controller's parameters, which are read one by one and checked against the profile.
+//! The flight controller's parameters, which are read one by one and checked against the rules of a profile.
 //!
-//! The rules (the allowed values of each parameter) are in `profile.rs`.
+//! A profile belongs to one autopilot firmware and one kind of command, surfaces or attitudes. Its rules state the allowed
+//! values of each parameter (`profile.rs`).
 
 use std::time::Duration;
 
@@ -8,18 +9,18 @@ use super::profile::{Matters, Need, Presence, Rule};
 
 /// Interval between requests for the same parameter.
 const AGAIN: Duration = Duration::from_millis(400);
-/// Largest number of requests per call. It spreads the requests over several calls for slow links.
+/// Largest number of requests per call. The limit spreads the requests over several calls, because the link may be slow.
 const AT_ONCE: usize = 4;
 /// Number of requests for one name after which the controller counts as lacking the parameter.
 const TRIES: u32 = 5;
 /// Valid pulse widths of a channel, µs.
 pub(super) const PULSE: std::ops::RangeInclusive<f64> = 800.0..=2200.0;
 
-/// Longest text of violations in characters. Together with its introduction it fits into the longest text that is sent
-/// to a client.
+/// Longest text about violations, characters. With its introduction it fits into the longest text that is sent to a
+/// client.
 const LONGEST: usize = 330;
 
-/// State of one rule's parameter.
+/// A rule, and what is known about its parameter.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     rule: &'static Rule,
@@ -110,8 +111,8 @@ impl Parameters {
         self.entries.iter().filter(matters).map(|entry| entry.report(system)).collect()
     }
 
-    /// Reason for which the profile cannot be used with these parameters: each violation with its remedy; `None` if all
-    /// fit.
+    /// Reason why the profile cannot be used with these parameters: each violation with its remedy. `None` if all parameters
+    /// fit the rules.
     pub(super) fn obstacle(&self, system: u8, radio: bool) -> Option<String> {
         let report = self.report(system, radio);
         let unread = report.iter().filter(|(_, standing, _)| *standing == Standing::Unread).count();
@@ -309,7 +310,7 @@ mod tests {
         assert_eq!(parameters.due(Duration::ZERO), both);
         assert!(parameters.due(AGAIN - Duration::from_millis(1)).is_empty());
         assert_eq!(parameters.due(AGAIN), both);
-        // Each of two names is requested five times.
+        // Each name is requested five times, also those of a parameter with two names.
         let mut parameters = Parameters::new(Stack::Ardupilot.rules(Authority::Surfaces));
         let asked: Vec<_> = (0..200).flat_map(|step| parameters.due(AGAIN * step)).collect();
         for name in ["MAV_GCS_SYSID", "SYSID_MYGCS", "RC_OPTIONS"] {

@@ -1,11 +1,13 @@
-//! Modes, streams and parameters of each flight stack.
+//! Modes, telemetry streams and parameters of each flight stack (PX4 and ArduPilot).
+//!
+//! Engagement is the moment at which the companion (Greylag's autopilot) takes control authority from the flight controller.
 
 use std::fmt;
 use std::time::Duration;
 
 use greylag_physics::airframe::ActuatorFigures;
 
-/// A flight stack with a profile.
+/// A flight stack that the companion supports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stack {
     /// PX4 for fixed-wing aircraft.
@@ -58,7 +60,7 @@ pub struct Stream {
     pub name: &'static str,
     /// Requested rate, Hz.
     pub hz: f64,
-    /// Whether engagement requires this stream.
+    /// Whether the companion engages only if it receives this stream.
     pub needed: bool,
     /// Frame length in MAVLink 2 without truncation, bytes.
     pub bytes: u32,
@@ -83,7 +85,7 @@ const ARDUPILOT_STREAMS: [Stream; 7] = [
     stream(11020, "AOA_SSA", 50.0, false, 16),
     stream(33, "GLOBAL_POSITION_INT", 10.0, false, 28),
     stream(168, "WIND", 2.0, false, 12),
-    // reports whether a radio is bound
+    // reports whether the controller receives an RC transmitter
     stream(1, "SYS_STATUS", 1.0, false, 43),
 ];
 
@@ -94,9 +96,9 @@ pub enum Need {
     OneOf(&'static [f64]),
     /// A value in this closed interval.
     Between(f64, f64),
-    /// The system id of the companion, which is that of the controller.
+    /// The system id of the companion, which equals that of the controller.
     OurSystem,
-    /// A plausible pulse width of a channel, µs. The companion uses the value for scaling.
+    /// A plausible pulse width of an RC channel, µs. The companion scales its stick commands with the value.
     Pulse,
     /// A bit mask without any of these bits.
     Without(u32),
@@ -131,9 +133,9 @@ pub struct Rule {
 /// Condition under which a parameter is checked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Matters {
-    /// Under all conditions.
+    /// The parameter is checked under all conditions.
     Always,
-    /// Only while the controller receives an RC transmitter.
+    /// The parameter is checked only while the controller receives an RC transmitter.
     WithRadio,
 }
 
@@ -248,8 +250,8 @@ const STATION: &str =
     "a radio is bound: a ground station's heartbeats would hide that the companion is dead";
 const FILTER: &str = "a low-pass of the gyros makes the loop late";
 const SCALE: &str = "the pulses are scaled by it";
-/// Loop rate of the flight controller, Hz. States at 100 Hz need a loop of 125 Hz, because a stream has at most 0.8 of
-/// the loop rate. Rates below 200 Hz were not flown.
+/// Loop rate of the flight controller, Hz. States at 100 Hz need a loop of 125 Hz, because ArduPilot sends a stream at no more
+/// than 0.8 of the loop rate. Rates below 200 Hz were not flown.
 const LOOP_RATE: Need = Need::Between(200.0, 2000.0);
 
 const ARDUPILOT_ATTITUDE: [Rule; 2] = [
@@ -263,7 +265,7 @@ const ARDUPILOT_ATTITUDE: [Rule; 2] = [
 ];
 
 impl Stack {
-    /// The MAV_AUTOPILOT of the stack.
+    /// The number of the stack in MAV_AUTOPILOT.
     pub fn autopilot(self) -> u8 {
         match self {
             Stack::Px4 => 12,
@@ -271,7 +273,7 @@ impl Stack {
         }
     }
 
-    /// The stack with this MAV_AUTOPILOT; `None` if it has no profile.
+    /// The stack with this number in MAV_AUTOPILOT; `None` if it is neither PX4 nor ArduPilot.
     pub fn of(autopilot: u8) -> Option<Stack> {
         [Stack::Px4, Stack::Ardupilot].into_iter().find(|stack| stack.autopilot() == autopilot)
     }
@@ -286,9 +288,9 @@ impl Stack {
         }
     }
 
-    /// Time for which commands are streamed before the steered mode is requested. PX4 checks its requirements every
-    /// 100 ms, and its stick input first passes through another module. It refused 2 of 3 requests after 150 ms, and
-    /// none after 300 ms. ArduPilot requires no stream before the request. Sticks sent early would act in LOITER.
+    /// Time for which commands are sent before the mode of [`Stack::steered`] is requested. PX4 checks its requirements every
+    /// 100 ms, and its stick input first passes through another module. It refused 2 of 3 requests after 150 ms, and none after
+    /// 300 ms. ArduPilot requires no commands before the request; sticks sent early would act in LOITER.
     pub fn lead(self) -> Duration {
         match self {
             Stack::Px4 => Duration::from_millis(500),
@@ -296,7 +298,7 @@ impl Stack {
         }
     }
 
-    /// The mode that is requested on return of control authority.
+    /// The mode that is requested when control authority is returned.
     pub fn hold(self) -> StackMode {
         match self {
             Stack::Px4 => mode("HOLD", 4, 3),
@@ -322,7 +324,8 @@ impl Stack {
         }
     }
 
-    /// State frames (100 Hz) per command. ArduPilot samples its channels at 50 Hz. Attitudes are also sent at 50 Hz.
+    /// Number of state frames (100 Hz) per command. ArduPilot samples its channels at 50 Hz. Attitudes are sent at 50 Hz to
+    /// both stacks.
     pub fn frames_per_command(self, authority: Authority) -> u64 {
         match (self, authority) {
             (Stack::Px4, Authority::Surfaces) => 1,

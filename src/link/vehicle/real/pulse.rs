@@ -1,29 +1,29 @@
-//! Watchdog while surfaces are commanded. It checks the rates of received states and executed cycles, and the fraction
-//! of lost frames.
+//! Watchdog for flights in which the companion commands the surfaces. It checks the rates of received states and of executed
+//! control cycles, and the fraction of lost frames. If a check fails, control authority is returned to the flight controller.
 
 use std::time::Duration;
 
 /// Length of a counting window.
 const WINDOW: Duration = Duration::from_millis(500);
-/// Nominal rate of states and cycles, Hz.
+/// Nominal rate of states and of control cycles, Hz.
 const RATE: f64 = 100.0;
 /// Fraction of the nominal rate below which control authority is returned.
 const LEAST: f64 = 0.4;
 
-/// Largest fraction of lost frames. Control authority is returned if two consecutive windows exceed it. Commands are
-/// probably lost at the same rate, and the loop oscillates if only every fourth command reaches the surfaces. A single
-/// gap of 0.2 s exceeds the limit in one window at most.
+/// Largest fraction of lost frames in a counting window. Two consecutive windows above it fail the check. The companion's
+/// commands are probably lost at the same rate, and the loop oscillates if only every fourth command reaches the surfaces. A
+/// single gap of 0.2 s exceeds the limit in one window at most.
 const LOSSY: f64 = 0.35;
 
-/// Counters of states and cycles in the open window.
+/// Counters of states and control cycles in the present window.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pulse {
     since: Option<Duration>,
     states: u32,
     cycles: u32,
-    /// Total frames received and lost at the window's start.
+    /// Total numbers of frames received and lost, at the window's start.
     before: Option<[u64; 2]>,
-    /// Whether the previous window lost too many frames.
+    /// Whether too many frames were lost in the previous window.
     lossy: bool,
 }
 
@@ -38,8 +38,9 @@ impl Pulse {
         *self = Pulse::default();
     }
 
-    /// Counts a cycle at `host`. If this closes a window with too few cycles, too few states or too many lost frames,
-    /// returns a text about it; otherwise `None`. `frames` are the total frames received and lost.
+    /// Counts a control cycle at the time `host`. If this ends a window with too few cycles or states, or the second window in
+    /// succession with too many lost frames, returns a text about it; otherwise `None`. `frames` are the total numbers of frames
+    /// received and lost.
     pub(super) fn cycle(&mut self, host: Duration, frames: [u64; 2]) -> Option<String> {
         self.cycles += 1;
         let before = *self.before.get_or_insert(frames);
@@ -74,7 +75,7 @@ impl Pulse {
 mod tests {
     use super::*;
 
-    /// The shortage reported in 1 s with a cycle every `cycle_ms` and a state in every `state`-th cycle.
+    /// Text that is returned within 1 s, with a cycle every `cycle_ms` and a state in every `state`-th cycle.
     fn second(cycle_ms: u64, state: u64) -> Option<String> {
         let mut pulse = Pulse::default();
         (0..1000 / cycle_ms).find_map(|i| {
@@ -85,7 +86,7 @@ mod tests {
         })
     }
 
-    /// The shortage reported in 2 s, with `lost` of ten frames lost from `from_ms` to `to_ms`.
+    /// Text that is returned within 2 s, with `lost` of ten frames lost from `from_ms` to `to_ms`.
     fn lossy(lost: u64, from_ms: u64, to_ms: u64) -> Option<String> {
         let mut pulse = Pulse::default();
         let mut frames = [0, 0];

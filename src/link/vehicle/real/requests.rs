@@ -1,4 +1,4 @@
-//! Stream requests and the controller's replies.
+//! Requests for message streams from the flight controller ("controller"), and its replies.
 
 use std::collections::{BTreeSet, VecDeque};
 
@@ -9,14 +9,14 @@ use super::profile::{Stack, Stream};
 pub(super) enum Answer {
     /// The reply changes nothing.
     Nothing,
-    /// The message is sent at its rate from now on.
+    /// The controller sends the message with this id at the requested rate from now on.
     Granted(u32),
-    /// The message is not sent at the requested rate. A repeated request is useless.
+    /// The controller does not send the message at the requested rate, and will not after another request.
     Denied,
 }
 
-/// Pending stream requests. A reply does not name its message, but replies come in the order of the requests. Requests
-/// without a reply are discarded at the next round.
+/// Stream requests that wait for a reply, and the replies so far. A reply does not name its message, but replies come in the
+/// order of the requests. Requests are made in rounds. A request without a reply is discarded when the next round starts.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Requests {
     waiting: VecDeque<u32>,
@@ -26,12 +26,12 @@ pub(super) struct Requests {
 }
 
 impl Requests {
-    /// Starts a new round of requests, and discards requests without a reply.
+    /// Starts a new round: discards the requests without a reply.
     pub(super) fn turn(&mut self) {
         self.waiting.clear();
     }
 
-    /// Whether a message may be requested. If so, the request is stored.
+    /// Whether the message `id` may be requested: it was not denied before. If so, the request is stored.
     pub(super) fn ask(&mut self, id: u32) -> bool {
         let may = !self.denied.contains(&id);
         if may {
@@ -40,12 +40,12 @@ impl Requests {
         may
     }
 
-    /// Registers the MAV_RESULT of the oldest request.
+    /// Assigns a reply with this MAV_RESULT to the oldest request, and returns its meaning.
     pub(super) fn answered(&mut self, result: u8) -> Answer {
         let Some(id) = self.waiting.pop_front() else { return Answer::Nothing };
         match result {
             0 if self.granted.insert(id) => Answer::Granted(id),
-            // MAV_RESULT_DENIED, MAV_RESULT_UNSUPPORTED
+            // 2 is MAV_RESULT_DENIED, 3 is MAV_RESULT_UNSUPPORTED
             2 | 3 => {
                 self.denied.insert(id);
                 Answer::Denied
@@ -54,19 +54,19 @@ impl Requests {
         }
     }
 
-    /// Whether a message was refused.
+    /// Whether the controller denied the message `id`.
     pub(super) fn is_denied(&self, id: u32) -> bool {
         self.denied.contains(&id)
     }
 
-    /// The refused streams that engagement requires, as text. They are returned only once.
+    /// The text of [`words`](Requests::words), but only once; `None` afterwards.
     pub(super) fn complaint(&mut self, stack: Stack) -> Option<String> {
         let words = self.words(stack).filter(|_| !self.reported)?;
         self.reported = true;
         Some(words)
     }
 
-    /// The refused streams that engagement requires, as text with the remedy; `None` if none was refused.
+    /// A text that names the denied streams which are needed for engagement, with a remedy; `None` if no such stream was denied.
     pub(super) fn words(&self, stack: Stack) -> Option<String> {
         let denied = |stream: &&Stream| stream.needed && self.denied.contains(&stream.id);
         let names: Vec<String> = stack
@@ -92,12 +92,12 @@ mod tests {
     fn what_is_denied_is_asked_for_no_more_and_said_once() {
         let mut requests = Requests::default();
         assert!([31, 105, 74, 33].into_iter().all(|id| requests.ask(id)));
-        // ArduPlane with a loop rate of 50 Hz sends 40 Hz at most.
+        // three requests are denied, as by ArduPlane with a loop rate of 50 Hz, which sends at 40 Hz at most
         let answers = [2, 2, 2, 0].map(|result| requests.answered(result));
         assert_eq!(answers[2..], [Answer::Denied, Answer::Granted(33)]);
         requests.turn();
         assert!(!requests.ask(31) && requests.ask(33));
-        // A repeated grant changes nothing.
+        // a second grant of the same message changes nothing
         assert_eq!(requests.answered(0), Answer::Nothing);
         let words = requests.complaint(Stack::Ardupilot).unwrap();
         assert!(words.contains("ATTITUDE_QUATERNION at 100 Hz") && words.contains("reboot"));

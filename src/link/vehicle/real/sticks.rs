@@ -11,7 +11,8 @@ const SCALE: RangeInclusive<f64> = 0.1..=1.0;
 /// Valid trims TRIM_ROLL and TRIM_PITCH of PX4, normalised.
 const TRIM: RangeInclusive<f64> = -0.5..=0.5;
 
-/// Rounds to integers and carries the remainder over to the next command. The mean is then exact.
+/// Rounds to integers and carries the remainder over to the next command. The mean of the integers then approaches the mean
+/// of the commands.
 #[derive(Clone, Copy, Debug, Default)]
 struct Rounding(f64);
 
@@ -106,7 +107,7 @@ impl Channel {
 }
 
 impl Sticks {
-    /// Axes of MANUAL_CONTROL in thousandths: x (positive nose down), y (positive right), z (throttle).
+    /// The axes x (positive nose down), y (positive right) and z (throttle) of MANUAL_CONTROL for `command`, in thousandths.
     ///
     /// In MANUAL, PX4 computes roll torque = y · FW_MAN_R_SC + TRIM_ROLL and pitch torque (nose up) = −x · FW_MAN_P_SC
     /// + TRIM_PITCH. If the controller reports an invalid value in flight, the last valid scaling of the axis is used.
@@ -126,7 +127,8 @@ impl Sticks {
         ]
     }
 
-    /// Pulse widths of channels 1 to 3 (roll, pitch, throttle), µs, from RCn_MIN, RCn_TRIM, RCn_MAX, RCn_REVERSED.
+    /// Pulse widths of channels 1 to 3 (roll, pitch, throttle) for `command`, µs, from RCn_MIN, RCn_TRIM, RCn_MAX and
+    /// RCn_REVERSED.
     ///
     /// ArduPilot's pitch channel is positive nose up, the elevator command positive nose down. If the controller
     /// reports an invalid value in flight, the last valid pulse widths of the channel are used.
@@ -165,7 +167,7 @@ mod tests {
         }
         for (sum, wanted) in sums.iter().zip([command.elevator, command.aileron, command.throttle])
         {
-            // The sum of a thousand commands deviates by at most half a count.
+            // The sum of a thousand rounded commands deviates from the exact sum by at most half a count.
             assert!((sum * 1e-6 - wanted).abs() < 1e-6, "{sum} for {wanted}");
         }
     }

@@ -1,11 +1,11 @@
-//! Measured quality of a link: rates, lost frames, jitter and round-trip times.
+//! Measured quality of the link to a flight controller: message rates, lost frames, jitter and round-trip times.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-/// Length of the window for rates.
+/// Length of the time window over which rates are counted.
 const WINDOW: Duration = Duration::from_secs(1);
-/// A frame is late if it lags by fewer sequence numbers than this. A larger lag is taken as a restart of the counter.
+/// A frame counts as late if its sequence number is behind by less than this. If it is further behind, the counter has restarted.
 const LATE: u32 = 32;
 /// Largest number of round-trip times that are kept.
 const TRIPS: usize = 256;
@@ -19,12 +19,12 @@ pub struct Traffic {
     pub bytes: u64,
     /// Rate in the last complete window, Hz.
     pub hz: f64,
-    /// Start of counting, host clock.
+    /// Time at which the counting of this message began, by this computer's clock.
     since: Duration,
-    /// Arrival of the last frame, host clock.
+    /// Arrival of the last frame, by this computer's clock.
     last: Duration,
     in_window: u32,
-    /// Mean interval (s), and sum of the squared deviations from it (s²), by Welford's method.
+    /// Mean interval between frames (s). `squares` is the sum of the squared deviations from it (s²), by Welford's method.
     mean: f64,
     squares: f64,
 }
@@ -52,7 +52,7 @@ impl Traffic {
     }
 }
 
-/// Statistics of one controller's traffic.
+/// Statistics of the traffic from one flight controller.
 #[derive(Clone, Debug, Default)]
 pub struct Survey {
     messages: BTreeMap<u32, Traffic>,
@@ -70,12 +70,12 @@ impl Survey {
     /// Counts a frame of the controller.
     pub(super) fn frame(&mut self, host: Duration, id: u32, sequence: u8, bytes: usize) {
         match self.sequence.map(|before| sequence.wrapping_sub(before)) {
-            // a repeated frame
+            // the last frame again
             Some(0) => {}
-            // a late frame was counted as lost before
+            // a late frame: it was counted as lost when a later one arrived
             Some(back) if u32::from(back) > 256 - LATE => self.lost = self.lost.saturating_sub(1),
             Some(ahead) => {
-                // a step of more than half of the counter's range is a restart
+                // a step by more than half of the counter's range is taken as a restart of the counter
                 self.lost += if ahead <= 128 { u64::from(ahead - 1) } else { 0 };
                 self.sequence = Some(sequence);
             }
@@ -88,7 +88,7 @@ impl Survey {
         self.messages.entry(id).or_insert(fresh).note(host, bytes);
     }
 
-    /// Restarts a message's statistics, for instance when the controller has accepted its rate.
+    /// Restarts the statistics of message `id`, for instance when the controller has accepted a rate for it.
     pub(super) fn restart(&mut self, host: Duration, id: u32) {
         if let Some(traffic) = self.messages.get_mut(&id) {
             let Traffic { hz, in_window, .. } = *traffic;
@@ -96,13 +96,13 @@ impl Survey {
         }
     }
 
-    /// Mean rate of a message over its counting time, Hz. The counting time is at least 1 s.
+    /// Mean rate of a message from the start of its counting to the last frame of any message, at least over 1 s, Hz.
     pub fn mean_hz(&self, traffic: &Traffic) -> f64 {
         let last = self.span.map_or(Duration::ZERO, |(_, last)| last);
         traffic.frames as f64 / last.saturating_sub(traffic.since).max(WINDOW).as_secs_f64()
     }
 
-    /// Closes the window if it is over at `host`. Returns whether it was closed.
+    /// Closes the window and computes the rates if the window has ended at `host`. Returns whether it has.
     pub(super) fn turn(&mut self, host: Duration) -> bool {
         let ends = *self.window_ends.get_or_insert(host + WINDOW);
         if host < ends {
@@ -117,12 +117,12 @@ impl Survey {
         true
     }
 
-    /// Whether no window was begun yet: `turn` was not called since the controller was found.
+    /// Whether no window has begun yet, because `turn` was not called since the controller was found.
     pub(super) fn is_new(&self) -> bool {
         self.window_ends.is_none()
     }
 
-    /// Stores a round-trip time.
+    /// Stores a round-trip time, and drops the oldest beyond [`TRIPS`].
     pub(super) fn trip(&mut self, time: Duration) {
         if self.trips.len() == TRIPS {
             self.trips.pop_front();
@@ -145,7 +145,7 @@ impl Survey {
         self.messages.iter().map(|(id, traffic)| (*id, traffic))
     }
 
-    /// Total frames received, and total frames lost according to gaps in the sequence numbers.
+    /// Number of frames received, and number of frames lost according to the gaps in the sequence numbers.
     pub(super) fn frames(&self) -> [u64; 2] {
         [self.received, self.lost]
     }
@@ -177,14 +177,14 @@ mod tests {
         }
         survey.frame(Duration::from_secs(8), 0, 10, 21);
         let rate = survey.messages().find(|(id, _)| *id == 22).map(|(_, t)| survey.mean_hz(t));
-        // Nine frames in 8 s.
+        // nine frames in the 8 s since the controller's first frame
         assert_eq!(rate, Some(9.0 / 8.0));
     }
 
     #[test]
     fn jitter_is_counted_from_the_granting_of_the_rate() {
         let mut survey = Survey::default();
-        // 4 Hz before the restart, 50 Hz after it.
+        // 4 Hz before the restart of the statistics and 50 Hz after it
         (0..8).for_each(|i| survey.frame(Duration::from_millis(250 * i), 74, i as u8, 32));
         survey.restart(Duration::from_secs(2), 74);
         (0..100)
@@ -198,7 +198,7 @@ mod tests {
         let mut survey = Survey::default();
         let mut sequence = 250u8;
         for i in 0..300u64 {
-            // Every tenth frame is lost. The other frames come every 10 ms, 1 ms early or late.
+            // frames are sent every 10 ms and arrive alternately 1 ms late and on time; every tenth frame is lost
             sequence = sequence.wrapping_add(1);
             let host = Duration::from_micros(10_000 * i + if i % 2 == 0 { 1000 } else { 0 });
             survey.turn(host);
@@ -207,10 +207,10 @@ mod tests {
             }
         }
         assert!((survey.hz(31) - 90.0).abs() < 2.0, "{}", survey.hz(31));
-        // The last lost frame is not detected yet: 29 of 299.
+        // the last frame is lost too, but nothing follows from which this could be seen: 29 of 299 count as lost
         assert!((survey.loss() - 29.0 / 299.0).abs() < 1e-9);
         let traffic = survey.messages().next().unwrap().1;
-        // Intervals of 9 ms and 11 ms, and of 20 ms over a lost frame.
+        // the intervals are 9 ms and 11 ms, and about 20 ms where a frame is lost
         assert!((2.0..5.0).contains(&traffic.jitter_ms()), "{}", traffic.jitter_ms());
         assert_eq!((survey.hz(105), survey.windows()), (0.0, 2));
     }
@@ -224,7 +224,7 @@ mod tests {
         }
         survey.frame(Duration::from_secs(13), 0, 10, 21);
         let rate = survey.messages().find(|(id, _)| *id == 22).map(|(_, t)| survey.mean_hz(t));
-        // Nine frames in 8 s, independent of the host's clock at the start.
+        // nine frames in 8 s: the time counts from the controller's first frame, which arrived at 5 s
         assert_eq!(rate, Some(9.0 / 8.0));
     }
 
@@ -263,7 +263,7 @@ mod tests {
         for (i, ms) in [0, 10, 30].into_iter().enumerate() {
             survey.frame(Duration::from_millis(ms), 31, i as u8, 60);
         }
-        // Intervals of 10 ms and 20 ms: √(2 · 5²) ms with one degree of freedom.
+        // the intervals are 10 ms and 20 ms: √(2 · 5²) ms with one degree of freedom
         let jitter = survey.messages().next().unwrap().1.jitter_ms();
         assert!((jitter - 7.071).abs() < 0.001, "{jitter}");
     }

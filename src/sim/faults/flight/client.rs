@@ -1,4 +1,5 @@
-//! Requests of the client and of a ground station during the flight.
+//! What the simulated client and ground station send to the companion during a flight under faults. The companion is this
+//! program's autopilot.
 
 use std::time::Duration;
 
@@ -7,12 +8,12 @@ use crate::faults::mix::{Fault, FaultKind};
 use crate::faults::scenario::{Asking, mode_of};
 use greylag_link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 
-/// Setpoint interval in steps: 10 Hz.
+/// Number of steps of 0.01 s between two setpoints of the client, which sends them at 10 Hz.
 const SETPOINT_EVERY: u64 = 10;
 
 impl Flight {
-    /// Performs the client's actions at a step. The client makes the requests that are due and arms when possible. At
-    /// 10 Hz it sends the setpoint of the present leg.
+    /// Performs the client's actions at the step `step`. The client makes the requests that are due, and arms when it can. At
+    /// 10 Hz it sends the attitude setpoint of the present leg of the scenario. It does nothing during a fault of the client.
     pub(super) fn client(&mut self, step: u64, now_s: f64, host: Duration, acting: &[Fault]) {
         if acting.iter().any(|fault| fault.kind == FaultKind::Client) {
             return;
@@ -38,7 +39,7 @@ impl Flight {
             if self.armed {
                 self.follower.asked = true;
                 self.desk.pilot().attitude_setpoint(now, setpoint);
-                // The request is refused only if the link is lost at this moment. The companion then flies HOLD.
+                // the request is refused only if the link is lost at this moment, and the companion then flies HOLD
                 let _ = self.desk.pilot().set_mode(now, Mode::Offboard);
             }
         }
@@ -60,12 +61,12 @@ impl Flight {
         self.hear_texts(now_s);
     }
 
-    /// Applies the mode change by which a ground station takes control from the companion. The ground station has its
-    /// own link.
+    /// Applies the mode change by which a ground station takes control from the companion. The ground station sends it to the
+    /// flight controller on a link of its own.
     pub(super) fn take_over(&mut self, step: u64) {
         let asked = &self.scenario.asked;
         let taken = asked.iter().any(|a| a.what == Asking::TakeOver && at_step(a.at_s) == step);
-        // if the flight controller already flies by itself, the companion sees no mode change
+        // if the flight controller already flies by itself, the companion has no control to lose
         let steered = self.aircraft.is_steered();
         if taken && self.aircraft.take_over() && steered {
             self.follower.asked = false;
@@ -73,7 +74,7 @@ impl Flight {
     }
 }
 
-/// Number of the step of 0.01 s in which the time `at_s`, s, lies.
+/// Number of the step of 0.01 s in which the time `at_s` (s) lies.
 fn at_step(at_s: f64) -> u64 {
     // 0.29 s is step 29, although 100 · 0.29 is 28.999999999999996
     (100.0 * at_s + 1e-6) as u64

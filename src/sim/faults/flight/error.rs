@@ -1,11 +1,11 @@
-//! Errors of setting up a flight under faults.
+//! Errors in setting up a simulated flight with faults.
 
 use greylag_sitl::shim::ShimError;
 
 use greylag_control::SetupError;
 use greylag_flight::pilot::ConfigError;
 
-/// A flight under faults cannot be set up.
+/// Reason why a simulated flight with faults cannot be set up.
 #[derive(Debug, thiserror::Error)]
 pub enum FaultsError {
     /// The aircraft cannot be built.
@@ -17,7 +17,7 @@ pub enum FaultsError {
     /// The fallback controller cannot be built.
     #[error(transparent)]
     Fallback(#[from] SetupError),
-    /// The pilot refuses its settings.
+    /// The companion's pilot refuses its settings.
     #[error(transparent)]
     Pilot(#[from] ConfigError),
     /// The companion refuses a parameter of the scenario.
@@ -27,7 +27,7 @@ pub enum FaultsError {
         name: String,
         /// Value of the parameter as a multiple of its default.
         times: f64,
-        /// Reason of the refusal.
+        /// Reason for the refusal.
         why: String,
     },
     /// The recorder's thread cannot be started.

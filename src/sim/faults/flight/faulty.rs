@@ -1,4 +1,7 @@
 //! Effects of the active faults on companion, sensors, clock and disk.
+//!
+//! The companion is Greylag's autopilot, which runs here on a desk: without threads, sockets or a wall clock. A finding is a
+//! violated requirement.
 
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -13,7 +16,7 @@ use crate::faults::judge::{Exposure, Finding};
 use crate::faults::mix::{Fault, FaultKind};
 
 impl Flight {
-    /// Number of 10 ms steps for which the companion is suspended; 0 if it is not suspended.
+    /// Number of 10 ms steps for which the companion is suspended at this step; 0 if it is not suspended.
     pub(super) fn nap(&mut self, acting: &[Fault]) -> u64 {
         let starved = acting.iter().find(|fault| fault.kind == FaultKind::Starvation);
         let Some(Fault { strength, .. }) = starved else { return 0 };
@@ -24,8 +27,8 @@ impl Flight {
         }
     }
 
-    /// Ends the companion when a fault of the kind `Killed` starts, and starts another companion when this fault ends.
-    /// Returns whether a companion is running.
+    /// Stops the companion when a fault of the kind `Killed` starts, and starts another companion when this fault ends. Returns
+    /// whether a companion is running.
     pub(super) fn is_alive(&mut self, acting: &[Fault]) -> bool {
         let killed = acting.iter().any(|fault| fault.kind == FaultKind::Killed);
         if killed && !self.killed {
@@ -44,7 +47,7 @@ impl Flight {
         !killed
     }
 
-    /// The conditions to which the aircraft is exposed at this step and which its companion cannot prevent.
+    /// The conditions at this step that the companion cannot prevent and that may cause a finding.
     pub(super) fn exposure(&mut self, acting: &[Fault]) -> Exposure {
         let inputs = self.aircraft.inputs();
         let same = std::mem::replace(&mut self.flown, inputs) == inputs;
@@ -56,14 +59,14 @@ impl Flight {
         }
     }
 
-    /// Applies the faults of sensors and clock.
+    /// Applies the faults of sensors, clock and disk. Returns the distortion of the sensors and the clock.
     pub(super) fn distortion(&mut self, acting: &[Fault], step: u64) -> Distortion {
         let mut distortion = Distortion::default();
         for fault in acting {
             let s = fault.strength;
             match fault.kind {
                 FaultKind::Frozen => distortion.frozen = true,
-                // a blocked pitot tube shows a constant airspeed of 0.4 to 1.4 times cruise
+                // a blocked pitot tube shows a constant airspeed, 0.4 to 1.4 times the cruise airspeed
                 FaultKind::Airspeed => {
                     distortion.airspeed_mps = Some(0.4 * self.cruise + self.cruise * s)
                 }
@@ -82,7 +85,7 @@ impl Flight {
         distortion
     }
 
-    /// Waits up to 3 s for the companion's report of the full disk. A missing report is a finding.
+    /// Waits up to 3 s for the companion's report that the disk is full. A missing report is a finding.
     pub(super) fn hear_of_the_disk(&mut self, now_s: f64) {
         if self.disk.as_ref().is_none_or(|disk| !disk.full.load(Ordering::Relaxed)) {
             return;

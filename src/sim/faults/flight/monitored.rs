@@ -1,5 +1,6 @@
-//! False alarms and detection delays of the model monitor, in flights with a simulated ArduPlane whose attitude
-//! estimate has errors.
+//! False alarms and detection delays of the model monitor, which compares measured accelerations with those that the model
+//! predicts. The flights are simulated with an emulated ArduPlane whose attitude estimate has errors. The companion is engaged
+//! when it has control of the aircraft.
 
 use std::time::Duration;
 
@@ -25,9 +26,9 @@ pub const ATTITUDE_DEG: [f64; 3] = [1.0, 1.0, 2.0];
 const WIND_MPS: f64 = 4.0;
 /// Duration of a flight, s.
 const FLIGHT_S: f64 = 60.0;
-/// Time at which a surface jams, s. The companion is engaged within the first 10 s.
+/// Time at which a surface jams, s. The companion is engaged earlier, within the first 10 s.
 pub const FAILS_S: f64 = 25.0;
-/// Roll and pitch of the legs, degrees. Each leg lasts `LEG_S` seconds.
+/// Commanded roll and pitch of the legs, degrees. Each leg lasts `LEG_S` seconds.
 const LEGS: [[f64; 2]; 6] =
     [[0.0, 2.0], [25.0, 3.0], [-20.0, 5.0], [0.0, 0.0], [-35.0, 4.0], [15.0, 6.0]];
 const LEG_S: f64 = 5.0;
@@ -35,15 +36,15 @@ const LEG_S: f64 = 5.0;
 /// Failure of the aircraft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failure {
-    /// No failure.
+    /// The aircraft has no failure.
     None,
     /// The elevator jams in flight.
     StuckElevator,
     /// The aileron jams in flight.
     StuckAileron,
-    /// Ice: the simulator's effect `drag_alpha2=100`, which doubles the drag at cruise.
+    /// Ice from the start: the simulator's effect `drag_alpha2=100`, which doubles the drag at cruise.
     Ice,
-    /// A centre of gravity 4 cm aft.
+    /// A centre of gravity that is 4 cm further aft, from the start.
     ShiftedLoad,
 }
 
@@ -68,8 +69,8 @@ impl Failure {
         }
     }
 
-    /// The simulator's effect that represents the failure, active from the start. `None` for a surface that jams in
-    /// flight.
+    /// The simulator's effect that represents the failure and is active from the start. `None` without failure and for a surface
+    /// that jams in flight.
     fn effect(self) -> Option<&'static str> {
         match self {
             Failure::Ice => Some("drag_alpha2=100"),
@@ -79,20 +80,20 @@ impl Failure {
     }
 }
 
-/// Monitor reports of one flight.
+/// Reports of the monitor in one flight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Watched {
     /// Constant errors of the estimated roll, pitch and yaw, degrees.
     pub attitude_error_deg: [f64; 3],
-    /// Time from which the companion can observe the failure, s. It is the time of the failure, or of the first
-    /// engagement if the failure is active from the start. `None` if the companion was never engaged.
+    /// Time from which the companion can observe the failure, s. It is the time of the failure, or the time of the first
+    /// engagement if that is later. `None` if the companion was never engaged.
     pub since_s: Option<f64>,
     /// Reports of the monitor with their times, s.
     pub said: Vec<(f64, String)>,
 }
 
 impl CompanionFactory {
-    /// Flies for 60 s under the monitor. All random numbers follow from `seed`.
+    /// Flies for 60 s with the monitor switched on. All random numbers follow from `seed`.
     ///
     /// # Errors
     ///
@@ -154,7 +155,7 @@ impl Bench {
         self.watched.since_s = self.watched.since_s.map(|_| FAILS_S);
     }
 
-    /// Advances 10 ms. Returns `false` when the flight has ended on the ground or with a state that is not finite.
+    /// Advances by 10 ms. Returns `false` if the flight has ended on the ground or with a state that is not finite.
     fn step(&mut self, step: u64) -> bool {
         let (at_s, host) = (step as f64 * 0.01, Duration::from_millis(1000 + 10 * step));
         let (mut down, mut up) = (Vec::new(), Vec::new());
@@ -174,7 +175,7 @@ impl Bench {
         matches!(self.controller.fly(), Ok(None))
     }
 
-    /// Sends the setpoint of the present leg, and arms when possible.
+    /// Sends the setpoint of the present leg. Arms the companion and sets OFFBOARD as soon as possible.
     fn client(&mut self, step: u64, at_s: f64, host: Duration) {
         let [roll, pitch] = LEGS[(at_s / LEG_S) as usize % LEGS.len()].map(f64::to_radians);
         let setpoint = AttitudeSetpoint { roll, pitch, thrust: None };
@@ -183,7 +184,7 @@ impl Bench {
         if !self.armed && step.is_multiple_of(10) {
             self.armed = self.desk.arm(host) == Verdict::Accepted;
             if self.armed {
-                // The request is refused only if the link is lost at this moment. The companion then flies HOLD.
+                // The mode is refused only if the link is lost at this moment. The companion then flies in HOLD.
                 let _ = self.desk.pilot().set_mode(now, Mode::Offboard);
             }
         }
@@ -197,7 +198,7 @@ impl Watched {
         self.said.iter().map(|(at, _)| at - since).find(|delay| *delay >= 0.0)
     }
 
-    /// Number of reports before `since_s`. All reports count if there is no failure.
+    /// Number of reports before `since_s`. All reports count if there is no failure or the companion was never engaged.
     pub fn false_alarms(&self, failure: Failure) -> usize {
         let healthy =
             |at: f64| failure == Failure::None || self.since_s.is_none_or(|since| at < since);

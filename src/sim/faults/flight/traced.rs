@@ -1,4 +1,4 @@
-//! Quantities of a running flight from which the flight rules are evaluated.
+//! Records the quantities of a simulated flight with faults at each step. From these samples the flight rules are evaluated.
 
 use super::Flight;
 use crate::faults::mix::{Fault, FaultKind};
@@ -7,14 +7,14 @@ use greylag_flight::pilot::{Decision, Source, TICK_S};
 use greylag_link::autopilot::{Autopilot, Mode, Status};
 use greylag_link::vehicle::Vehicle;
 
-/// Time constant of the low-pass filter that separates slow from fast motion of a surface, s. `MEAN_S` is the time
-/// constant of the mean square of the fast motion, s.
+/// Time constant of the high-pass filter of a surface command, s. `MEAN_S` is the averaging time of the square of the filtered
+/// command, s.
 const SLOW_S: f64 = 0.5;
 const MEAN_S: f64 = 1.0;
-/// Smallest difference of roll or pitch, rad, that counts as a new target.
+/// A commanded roll or pitch that changes by at least this much is a new commanded attitude, rad.
 const SAME: f64 = 1e-3;
 
-/// Quantities that are updated at every step.
+/// The state that is kept from step to step for the samples. [`Sample`] explains the quantities.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Follower {
     /// Whether a client has requested the companion to fly and no other pilot has taken control since then.
@@ -33,7 +33,7 @@ pub(super) struct Follower {
     surfaces: [Fast; 2],
 }
 
-/// High-pass filter of a surface deflection, with the mean square of its output.
+/// High-pass filter of a surface command (−1..1), with the mean square of the filtered command.
 #[derive(Clone, Copy, Debug, Default)]
 struct Fast {
     slow: f64,
@@ -70,13 +70,14 @@ impl Follower {
         (self.decision, self.fresh) = (Some(*decision), true);
     }
 
-    /// Resets the quantities after the companion was killed. Its decisions are void, and its successor is not engaged.
+    /// Resets the quantities that belong to the companion's process, after a fault killed it. The process that replaces it has
+    /// made no decision yet, and no client has requested it to fly.
     pub(super) fn died(&mut self) {
         (self.decision, self.fresh, self.asked) = (None, false, false);
         (self.held_s, self.moved) = (0.0, 0.0);
     }
 
-    /// Updates the time for which the companion has held the same commanded attitude.
+    /// Updates the time for which the companion has held the same commanded attitude. If `flown` is false, the time starts anew.
     fn steady(&mut self, flown: bool) {
         let target = self.decision.map_or([0.0; 2], |d| [d.target.roll, d.target.pitch]);
         let same = target.iter().zip(self.target).all(|(a, b)| (a - b).abs() < SAME);
@@ -86,7 +87,7 @@ impl Follower {
 }
 
 impl Flight {
-    /// Stores the sample of a step if samples are requested.
+    /// Stores the sample of the step at `now_s` (s), if samples are requested. `acting` are the faults that act in this step.
     pub(super) fn sample(&mut self, now_s: f64, acting: &[Fault]) {
         let Some(trace) = &mut self.trace else { return };
         let Status { mode, armed, failsafe, .. } = self.desk.pilot().status();
@@ -113,7 +114,7 @@ impl Flight {
         follower.age_s =
             if std::mem::take(&mut follower.fresh) { 0.0 } else { follower.age_s + TICK_S };
         let inputs = self.aircraft.inputs();
-        // where the companion commands attitudes, the flight controller moves the surfaces
+        // if the companion commands attitudes, the surface commands are those of the flight controller and are not filtered
         let ours = steered && self.desk.vehicle().flies_surfaces();
         let [aileron, elevator] = &mut follower.surfaces;
         aileron.update(if ours { inputs.aileron } else { aileron.slow });

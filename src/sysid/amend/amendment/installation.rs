@@ -1,4 +1,6 @@
-//! Decides by the held-out flights whether a model keeps the constants of the installation that its fit has estimated.
+//! Decides whether a model keeps the constants of the installation that its fit has estimated: sensor errors, and the
+//! misalignment of the measured axes, that all flights of the aircraft have in common. The error of free runs over held-out
+//! flights, which the fit does not use, decides.
 
 use std::sync::Arc;
 
@@ -19,7 +21,8 @@ pub(super) struct Sensors {
 }
 
 impl Sensors {
-    /// Decides from `fit`, the fit of the model `given` without added effects.
+    /// Decides from `fit`, the fit of the model `given` without added effects. The sensor errors are kept if they lower the
+    /// held-out error by at least the fraction `IMPROVED`. If `asked` is `Kept`, they are kept unless they raise it.
     pub(super) fn decided(
         asked: SensorErrors,
         given: &GreyBox,
@@ -50,8 +53,8 @@ impl Sensors {
     }
 }
 
-/// `fitted` with the sensor errors that the installation of `given` has. A fit of the misalignment does not use those of
-/// `given`, so its installation is then left without sensor errors.
+/// Returns `fitted` with the sensor errors of `given` in place of the estimated ones. If the fit has estimated the
+/// misalignment, the result has no sensor errors, because such a fit does not use those of `given`.
 fn without_sensors(fitted: &GreyBox, given: &GreyBox) -> GreyBox {
     let mut bare = fitted.clone();
     let known = Arc::make_mut(&mut bare.known);

@@ -1,4 +1,8 @@
-//! Forward selection of the requested effects. Free runs over held-out flights decide which effects are accepted.
+//! Forward selection of the effects that a user asks to add to a model. An effect is a group of model terms with coefficients.
+//!
+//! After each fit to the training flights, the model flies free runs (open-loop simulations) along held-out flights, which no
+//! fit uses. An effect is accepted if the free-run errors decrease and its estimates pass the checks of [`judge`]. A convention
+//! is a choice of integrator, force axes or air density.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -16,37 +20,38 @@ use crate::compare::HorizonScore;
 use crate::progress::{self, Progress, report};
 use greylag_model::GreyBox;
 
-/// Largest number of passes over the requested effects, and over the alternative conventions.
+/// Largest number of passes over the requested effects, and of passes over the conventions.
 const ROUNDS: usize = 3;
 
-/// The fit of the model with the effects accepted so far, and its held-out scores `after`.
+/// The fit of the model with the effects accepted so far, and its free-run errors `after` on held-out flights.
 #[derive(Clone)]
 pub(super) struct Selection {
-    /// The fit of the model without added effects, with its held-out scores.
+    /// The fit of the model without added effects, and its free-run errors on held-out flights.
     pub(super) tuned: (Fit, Vec<HorizonScore>),
     pub(super) fit: Fit,
     pub(super) after: Vec<HorizonScore>,
-    /// The accepted effects, in order.
+    /// The accepted effects, in the order of acceptance.
     accepted: Vec<Added>,
     /// The outcome for every requested effect.
     pub(super) effects: Vec<AddedEffect>,
 }
 
-/// Inputs of the selection: options, flights of the fit, judge with the held-out flights.
+/// Inputs of the selection: options, training flights, and a judge with the held-out flights.
 pub(super) struct Ask<'a> {
     pub(super) options: &'a Options,
     pub(super) train: &'a [Flight],
     pub(super) judge: &'a Judge<'a>,
     pub(super) progress: &'a Progress<'a>,
-    /// Number of fits that have begun; the first fit has no added effects.
+    /// Number of fits that have begun. The first of them is the fit without added effects.
     pub(super) begun: AtomicUsize,
-    /// Decision on the flights' common sensor errors, made after the first fit.
+    /// Decision whether sensor errors that all flights have in common become constants of the installation. It is made after the
+    /// first fit.
     pub(super) sensors: OnceLock<Sensors>,
 }
 
 impl Ask<'_> {
-    /// Selects the effects that improve `model`. Effects with starting values from a diagnosis are first tried jointly. The
-    /// others are tried one by one.
+    /// Selects the effects that improve `model`. Effects with starting values, which come from a diagnosis, are first tried
+    /// jointly. All effects that are not accepted then are tried one by one.
     pub(super) fn selected(&self, model: &GreyBox) -> Result<Selection, AmendError> {
         let tuned = match &self.options.tuned {
             Some(known) => self.with_sensors(known.clone(), model),
@@ -69,14 +74,14 @@ impl Ask<'_> {
         self.rest(model, first)
     }
 
-    /// Tries, one by one, the requested effects that the selection `so_far` lacks. A rejected effect is tried again after another
-    /// effect has been accepted.
+    /// Tries, one by one, the requested effects that are not in the selection `so_far`. A rejected effect is tried again after
+    /// another effect has been accepted.
     fn rest(&self, model: &GreyBox, so_far: Selection) -> Result<Selection, AmendError> {
         let Options { effects, refused, .. } = self.options;
         let mut best = (so_far.fit, so_far.after);
         let mut accepted: Vec<&Added> = so_far.accepted.iter().collect();
-        // each verdict is paired with the number of other accepted effects when it was reached, or with 0 for jointly
-        // accepted effects
+        // each verdict is paired with the number of other effects that were accepted when it was reached; this number is 0
+        // for the effects that were accepted jointly
         let verdict = |added: &Added| {
             let tried = so_far.effects.iter().find(|e| e.id == added.id && e.joined);
             tried.map(|tried| (tried.clone(), 0))
@@ -105,10 +110,11 @@ impl Ask<'_> {
         Ok(Selection { tuned: so_far.tuned, fit: best.0, after: best.1, accepted, effects })
     }
 
-    /// Jointly fits the effects that a diagnosis found, and leaves out effects with implausible estimates.
+    /// Fits all effects with starting values jointly, and leaves out those with implausible estimates. `best` is the fit without
+    /// added effects. Returns the remaining effects, their fit and its free-run errors on held-out flights.
     ///
-    /// A large error that one effect corrects can hide the gain of another effect. Tests of single effects would miss this
-    /// other effect. Returns `None` if a fit fails, if fewer than two effects remain, or if the held-out error does not
+    /// If the model lacks two effects, the error due to one can hide the gain of adding the other. Tests of single effects would
+    /// miss the latter. Returns `None` if a fit fails, if fewer than two effects remain, or if the held-out error does not
     /// decrease by more than 1 %.
     fn together(
         &self,
@@ -128,7 +134,8 @@ impl Ask<'_> {
             return Ok(None);
         }
         let Some(mut kept) = fitted(&all)? else { return Ok(None) };
-        // an effect that the model's coefficients can represent would widen the intervals of all estimates
+        // effects that are confounded with a coefficient of the model are left out unless the error is lower with them,
+        // because they would widen the intervals of all estimates
         let mut fewer = all.clone();
         fewer.retain(|a| !judge::doubled(&a.id, &kept.0.parameters));
         if fewer.len() < all.len()
@@ -153,8 +160,8 @@ impl Ask<'_> {
         Ok(None)
     }
 
-    /// Tries the alternatives to the conventions of `model` one by one. A rejected alternative is tried again after another
-    /// one has been adopted. `best` is the selection under the conventions of `model`.
+    /// Tries the alternative to each convention of `model`, one by one. A rejected alternative is tried again after another one
+    /// has been adopted. `best` is the selection with the conventions of `model`.
     pub(super) fn with_conventions(
         &self,
         model: &GreyBox,
@@ -192,9 +199,9 @@ impl Ask<'_> {
         Ok((best, verdicts.into_iter().flatten().map(|(tried, _)| tried).collect()))
     }
 
-    /// The selection for `other`, the model under another convention. The accepted effects are fitted again. The other
-    /// requested effects are tried again only if the held-out error or the fit's residuals decrease. `None` if the fit
-    /// fails.
+    /// The selection for `other`, the model with another convention. It starts with the effects accepted in `best`, which are
+    /// fitted again. The other requested effects are tried again only if the error on held-out flights or the residuals of the
+    /// fit decrease. `None` if the fit fails.
     fn under(&self, other: &GreyBox, best: &Selection) -> Result<Option<Selection>, AmendError> {
         let joined: Vec<&Added> = best.accepted.iter().collect();
         let Some(fit) = settled(self.with_effects(other, &joined, &best.fit.model))? else {
@@ -209,7 +216,7 @@ impl Ask<'_> {
         }
     }
 
-    /// Fits `model` with `effects`. Effects that `near` contains start at their values in `near`.
+    /// Fits `model` with `effects` added. The coefficients of an effect that `near` has start at their values in `near`.
     fn with_effects(
         &self,
         model: &GreyBox,
@@ -221,7 +228,7 @@ impl Ask<'_> {
             let own = format!("{}.", added.id);
             let fitted = near.coefficients().iter().filter(|c| c.name.starts_with(&own));
             let fitted: Vec<f64> = fitted.map(|c| c.value).collect();
-            // the starting values of a curve are its prior means: they must not come from an earlier fit
+            // the starting values of a curve (an effect given by ordinates) are its prior means and must not come from a fit
             let start = match fitted.is_empty() || parameters::SLIGHT.contains(&added.id.as_str()) {
                 true => added.start.clone(),
                 false => Some(fitted),
@@ -234,7 +241,7 @@ impl Ask<'_> {
         self.fit(&model, &options)
     }
 
-    /// Fits `model` to the training flights and reports progress as a fraction of the whole selection.
+    /// Fits `model` to the training flights, and reports the progress as a fraction of the whole selection.
     fn fit(&self, model: &GreyBox, options: &FitOptions) -> Result<Fit, AmendError> {
         let progress = progress::part(self.progress, self.done());
         self.begun.fetch_add(1, Ordering::Relaxed);
@@ -244,7 +251,7 @@ impl Ask<'_> {
         Ok(self.with_sensors(fit, model))
     }
 
-    /// `fit` of `model` with the flights' common sensor errors as the first fit has decided.
+    /// Returns `fit`, a fit of `model`, after the decision on common sensor errors ([`Ask::sensors`]) was applied to it.
     fn with_sensors(&self, mut fit: Fit, model: &GreyBox) -> Fit {
         let asked = self.options.per_flight.sensors;
         let decided = self.sensors.get_or_init(|| Sensors::decided(asked, model, &fit, self.judge));
@@ -252,8 +259,8 @@ impl Ask<'_> {
         fit
     }
 
-    /// Fractions of the whole selection that are complete before and after the next fit. They are limited to 0.98, because
-    /// some effects are tried twice.
+    /// Estimated fractions of the whole selection that are complete before and after the next fit. They are limited to 0.98,
+    /// because some effects are tried more than once.
     fn done(&self) -> [f64; 2] {
         let begun = self.begun.load(Ordering::Relaxed) as f64;
         let planned = 1.0 + self.options.effects.len() as f64;
@@ -262,7 +269,8 @@ impl Ask<'_> {
 }
 
 impl Selection {
-    /// Held-out free-run error at the longest horizon up to 5 s that a run reaches; NaN if no run reaches a horizon.
+    /// Error of the free runs on held-out flights, at the longest horizon up to 5 s that a run reaches. NaN if no run reaches any
+    /// horizon.
     fn error(&self) -> f64 {
         judge::judged(&self.after).unwrap_or(f64::NAN)
     }

@@ -1,4 +1,5 @@
-//! Results of a finished fit: estimates with their intervals, estimates of each flight, and notes for the user.
+//! Results of a finished output-error fit: estimates with their intervals, estimates from each flight alone, constants of each
+//! flight, and notes for the user.
 
 use std::sync::Arc;
 
@@ -17,20 +18,21 @@ use greylag_model::{GreyBox, Known};
 
 /// Half width of a 95 % interval in standard deviations of a normal distribution.
 const NORMAL_95: f64 = 1.96;
-/// A prior adds no information to the bounds if its standard deviation is at least this fraction of the range of the
-/// bounds.
+/// A prior counts as adding no information to the bounds of a coefficient if its standard deviation is at least this fraction of
+/// the distance between them.
 const WIDE: f64 = 0.5;
-/// The flights excite a coefficient if its posterior standard deviation is below this fraction of its prior standard
+/// The flights count as exciting a coefficient if its posterior standard deviation is below this fraction of its prior standard
 /// deviation.
 const LEARNED: f64 = 0.7;
 /// Magnitude of the error correlation above which two coefficients are confounded.
 const SAME: f64 = 0.9;
-/// Last change of a coefficient, in standard deviations, above which a fit has not converged.
+/// A fit counts as not converged if the last step changed a coefficient by more than this number of its standard deviations.
 const UNSETTLED: f64 = 0.5;
-/// A fit is rejected if the last accepted step changed a coefficient by more than this number of standard deviations.
+/// A fit is rejected if the last step changed a coefficient by more than this number of its standard deviations. It is kept if
+/// the search ended because no smaller step decreased the cost.
 const LOST: f64 = 5.0;
 
-/// Note that names the held coefficients; `None` if there are none.
+/// A note for the user that names the held coefficients; `None` if there are none.
 fn held_note(held: &[String]) -> Option<String> {
     (!held.is_empty()).then(|| {
         format!(
@@ -41,7 +43,7 @@ fn held_note(held: &[String]) -> Option<String> {
     })
 }
 
-/// Whether `value` lies at a bound of `free`, within a millionth of the range of the bounds.
+/// Whether `value` lies at a bound of `free`, within a millionth of the distance between the bounds.
 fn at_bound(free: &Free, value: f64) -> bool {
     let (low, high) = free.bounds;
     let at = |bound: f64| (value - bound).abs() <= 1e-6 * (high - low);
@@ -49,17 +51,17 @@ fn at_bound(free: &Free, value: f64) -> bool {
 }
 
 impl Search<'_> {
-    /// Holds the undetermined coefficients at their values in the model file, and returns their names.
+    /// Holds the undetermined coefficients of the given model at their values in the model file, and returns their names.
     ///
-    /// A coefficient is undetermined if its prior standard deviation is at least half the range of its bounds and its 95 %
-    /// interval contains both bounds. If all coefficients are undetermined, none is held.
+    /// A coefficient is undetermined if its prior standard deviation is at least half the distance between its bounds, its 95 %
+    /// interval contains both bounds, and its estimate is at neither of them. If all coefficients are undetermined, none is held.
     pub(super) fn hold_undetermined(&mut self) -> Vec<String> {
         let Some(cholesky) = self.system().information.cholesky() else { return Vec::new() };
         let inverse = cholesky.inverse();
         let undetermined = |(k, f): (usize, &Free)| {
             let (value, half) = (self.place.theta[k], NORMAL_95 * inverse[(k, k)].sqrt());
             let wide = f.width >= WIDE * (f.bounds.1 - f.bounds.0);
-            // data that drive a value to a bound contain information about it
+            // flights that drive an estimate to a bound contain information about the coefficient
             let inside = !at_bound(f, value);
             let holds_all = value - half <= f.bounds.0 && value + half >= f.bounds.1;
             !f.added && wide && inside && holds_all
@@ -78,10 +80,10 @@ impl Search<'_> {
         names
     }
 
-    /// The fit at the present estimates, with intervals.
+    /// The result of the fit at the present estimates, with intervals.
     ///
-    /// The model of the fit is `given` with the estimated coefficients and without terms for trims. `held` names the
-    /// undetermined coefficients.
+    /// Its model is `given` with the estimated coefficients. The trims of the flights (constants that one flight adds to the
+    /// coefficients) are not part of it. `held` names the undetermined coefficients.
     pub(super) fn finish(self, given: &GreyBox, held: &[String]) -> Result<Fit, AmendError> {
         let model_name = || self.base.name.clone();
         if self.change.0.is_nan() || (self.change.0 > LOST && !self.stuck) {
@@ -137,7 +139,8 @@ impl Search<'_> {
         })
     }
 
-    /// Constants of the flights to be written to the model's file; `given` is the model before the fit.
+    /// The constants of each flight and of the installation for the model's file, such as trims and sensor errors. `given` is the
+    /// model before the fit.
     fn known(&self, given: &GreyBox, sd: &[f64]) -> Known {
         let place = |k: usize| self.free.len() + k * self.of_flight();
         let numbered = self.flights.iter().enumerate();
@@ -155,7 +158,7 @@ impl Search<'_> {
         let (size, constants) = (self.of_flight(), self.asked.constants());
         let count = self.flights.len();
         let place = |flight: usize, which: usize| self.free.len() + flight * size + which;
-        // the mean over the flights is subtracted from the estimate, because it is confounded with the model's coefficient
+        // the mean over the flights is subtracted from each estimate, because the mean is confounded with a coefficient
         let beside_mean = |flight: usize, which: usize| {
             let value =
                 |k: usize| self.place.own[k].unknowns(&self.asked).nth(which).unwrap_or(0.0);
@@ -217,8 +220,8 @@ impl Search<'_> {
         self.free.iter().enumerate().map(one).collect()
     }
 
-    /// Estimates from each flight alone, to first order: one step from the common optimum with the equations of the flight and
-    /// the prior.
+    /// For each coefficient, its estimates from each flight alone. They are first-order estimates: one Gauss–Newton step from the
+    /// common optimum, with the normal equations of the flight and the prior.
     fn by_flight(&self, system: &System) -> Vec<Vec<FlightEstimate>> {
         let count = self.free.len();
         let mut all = vec![Vec::new(); count];
@@ -251,11 +254,11 @@ impl Search<'_> {
         all
     }
 
-    /// Factor on the intervals for disagreement between flights (Birge ratio, at least 1).
+    /// Factor by which the intervals are widened if the flights disagree (Birge ratio, at least 1).
     ///
     /// The factor is the root mean square difference between the estimates of single flights and the common estimate, in
-    /// standard deviations of the difference. It accounts for errors that are constant within a flight, for example a clock
-    /// skew.
+    /// standard deviations of the difference. It accounts for errors that are constant within a flight, for example the delay of
+    /// a sensor.
     fn disagreement(&self, sd: &[f64], by_flight: &[Vec<FlightEstimate>]) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
         for (k, f) in self.free.iter().enumerate() {
@@ -289,7 +292,7 @@ impl Search<'_> {
         std::array::from_fn(|k| (square(k) / count).sqrt())
     }
 
-    /// Sentence on the parameter that has not converged; `None` if all have converged.
+    /// A sentence on the coefficient that has not converged; `None` if all have converged.
     fn unsettled(&self) -> Option<String> {
         let (change, parameter) = (self.change.0, &self.free[self.change.1].name);
         (change > UNSETTLED).then(|| {

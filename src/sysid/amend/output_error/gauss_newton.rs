@@ -1,4 +1,5 @@
-//! Damped Gauss–Newton step, limited by the bounds and the largest steps of the coefficients.
+//! Damped Gauss–Newton step of the output-error fit. The step keeps the bounds of the coefficients and their largest changes
+//! per iteration. A shot is a part of a flight that is simulated from its own initial state (multiple shooting).
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -9,7 +10,7 @@ use crate::amend::flight::SENSORS;
 use crate::amend::normal::{self, Normal, Place};
 use crate::amend::parameters::Free;
 
-/// Normal equations of all shots together, with the inverse variances `prior` of the unknowns.
+/// Normal equations of all shots together. `prior` holds the inverse prior variances of the unknowns.
 pub(super) struct System {
     pub(super) shots: Vec<Normal>,
     pub(super) information: DMatrix<f64>,
@@ -29,7 +30,7 @@ impl Search<'_> {
         DVector::from_vec(all)
     }
 
-    /// Number of constants of a flight.
+    /// Number of constants that are estimated for each flight.
     pub(super) fn of_flight(&self) -> usize {
         SENSORS + self.asked.constants().len()
     }
@@ -75,7 +76,8 @@ impl Search<'_> {
         System { shots, information, gradient, prior }
     }
 
-    /// Takes one damped step that decreases the cost. Returns false if the cost does not decrease with any damping.
+    /// Takes one damped step that decreases the cost. Up to eight increasing values of the damping are tried. Returns false if
+    /// the cost decreases with none of them.
     pub(super) fn step(&mut self, system: &System, damping: &mut f64) -> Result<bool, AmendError> {
         let before = self.cost(&self.place);
         for _ in 0..8 {
@@ -93,7 +95,7 @@ impl Search<'_> {
         Ok(false)
     }
 
-    /// The damped step, limited by the bounds and the largest steps of the coefficients.
+    /// Solves the damped normal equations. Steps of coefficients that would pass a limit of [`Self::room`] are held at it.
     fn solve(&self, system: &System, damping: f64) -> Result<DVector<f64>, AmendError> {
         let singular = || AmendError::Singular { model: self.base.name.clone() };
         let mut held: Vec<Option<f64>> = vec![None; system.gradient.len()];
@@ -110,7 +112,7 @@ impl Search<'_> {
             for (k, known) in held.iter().enumerate().filter_map(|(k, h)| h.map(|h| (k, h))) {
                 right[k] = system.information[(k, k)] * known;
             }
-            // scaled to a unit diagonal: the result does not depend on the units
+            // the matrix is scaled to a unit diagonal, so that the effect of the damping does not depend on the units
             for (a, b) in (0..scale.len()).flat_map(|a| (0..scale.len()).map(move |b| (a, b))) {
                 matrix[(a, b)] *= scale[a] * scale[b];
             }
@@ -133,7 +135,7 @@ impl Search<'_> {
         Err(singular())
     }
 
-    /// Largest decrease (negative) and increase of coefficient `k` in one step.
+    /// Largest decrease (a negative number) and largest increase of coefficient `k` in one step.
     fn room(&self, k: usize, f: &Free) -> (f64, f64) {
         let here = self.place.theta[k];
         ((f.bounds.0 - here).max(-f.stride), (f.bounds.1 - here).min(f.stride))
@@ -160,7 +162,7 @@ impl Search<'_> {
         next
     }
 
-    /// Largest change of a coefficient in its standard deviations, and the coefficient's index.
+    /// The largest change of any coefficient, in standard deviations of its estimate, and the index of this coefficient.
     fn in_deviations(&self, system: &System, step: &DVector<f64>) -> (f64, usize) {
         let Some(cholesky) = system.information.clone().cholesky() else {
             return (f64::INFINITY, 0);

@@ -1,19 +1,22 @@
-//! Weights of the states and the shots in a search, and the choice of its starting point.
+//! Weights and starting point of the output-error fit.
+//!
+//! The fit simulates shots: short stretches of the flights, each from its own initial state. The residuals of a shot are the
+//! differences between the recorded and the simulated states. States and shots have separate weights.
 
 use super::Search;
 use crate::amend::normal::Place;
 use crate::amend::shooting;
 use greylag_num::statistics::{correlation_length, quantile};
 
-/// Smallest standard deviations of residuals, in the units of the state. They cover the errors that remain without noise:
-/// those of discrete model steps and of interpolated deflections.
+/// Smallest standard deviations of residuals, in the units of the state. They cover errors that are present without noise, due
+/// to discrete model steps and interpolated deflections.
 const FLOOR: [f64; 8] = [5e-4, 5e-4, 0.01, 2e-3, 2e-3, 2e-3, 5e-4, 5e-4];
 /// A shot is down-weighted if its weighted mean square residual exceeds the median of all shots by this factor.
 const OUTLYING: f64 = 6.0;
 
 impl Search<'_> {
-    /// Sets the weights from the present residuals: inverse variance of each state divided by a common correlation length, and
-    /// lower weights for outlying shots.
+    /// Sets the weights from the present residuals. The weight of a state is the inverse of its residual variance, divided by a
+    /// common correlation length. Outlying shots get lower weights.
     ///
     /// With a separate correlation length for each state, the iteration would not converge to useful weights. A state that
     /// drifts has a longer correlation length and therefore a lower weight. It then drifts more, until the fit ignores this
@@ -42,9 +45,9 @@ impl Search<'_> {
         }
     }
 
-    /// Restarts at `given`, the coefficients of the model file, if they follow the flights more closely in shots of
-    /// `length_s` (s) than the equation-error estimate. A kink of a table or a delayed sensor can bias the equation-error
-    /// estimate.
+    /// Chooses the starting point: the equation-error estimate or `given`, the coefficients of the model file. The choice is the
+    /// one with the smaller residuals in shots of `length_s` (s). A kink of a table or a delayed sensor can bias the
+    /// equation-error estimate.
     pub(super) fn start_from_the_closer(&mut self, given: &[f64], length_s: f64) {
         self.shots = shooting::cut(self.flights, length_s);
         self.place.starts = vec![[0.0; 8]; self.shots.len()];
@@ -54,7 +57,7 @@ impl Search<'_> {
         }
     }
 
-    /// Sum over the shots of their weighted root mean square residuals. A single diverged shot does not dominate this sum.
+    /// Sum over the shots of the root of their weighted mean square residual. A single diverged shot does not dominate this sum.
     fn distance(&self, place: &Place) -> f64 {
         let square =
             |r: &[f64; 8]| (0..8).map(|k| self.weights.output[k] * r[k] * r[k]).sum::<f64>();

@@ -1,12 +1,13 @@
-//! Answer of a comparison: free-run error of the first model, and of each other model relative to the first.
+//! Summary of a comparison of models: the error of the first model in free runs (simulations from recorded states), and the
+//! errors of the other models relative to it.
 
 use super::{ANSWER_S, Answer, Seen, Stage, Subject, Way};
 use crate::compare::forecast::ForecastResult;
 use crate::compare::result::ModelResult;
 use crate::weak_form::prepared::Prepared;
 
-/// The answer of a comparison of `models` on `flights`. The best of `forecasts`, which use no aerodynamics, is the
-/// baseline.
+/// The summary of a comparison of `models` on `flights`. The baseline is the forecast of `forecasts` with the smallest error.
+/// Forecasts use no aerodynamics.
 pub fn between(
     models: &[ModelResult],
     flights: &[Prepared],
@@ -17,7 +18,7 @@ pub fn between(
         model: &model.name,
         scores: &model.free_run,
     });
-    // error at the horizon of the answer: the longest reached horizon up to ANSWER_S, or else the shortest reached horizon
+    // error at the longest horizon up to ANSWER_S that any run reaches or, without one, at the shortest reached horizon
     let error = |f: &ForecastResult| {
         let reached = || f.free_run.iter().filter(|s| s.runs > 0);
         let longest = reached()

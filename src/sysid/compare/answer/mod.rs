@@ -1,5 +1,7 @@
-//! Short answer (summary) of a comparison, a diagnosis or an amendment: change of the free-run error, added effects, and
+//! Short answer (summary) of a comparison, a diagnosis or an amendment: change of the prediction error, added effects, and
 //! largest remaining error. Terminal, web page, workbench and JSON all show this answer.
+//!
+//! The prediction error is that of free runs: simulations of the model with the recorded controls.
 
 pub(super) mod between;
 mod numbers;
@@ -35,7 +37,7 @@ pub struct Answer {
 /// A model in the sequence from the given model to the last model.
 #[derive(Clone, Copy, Debug)]
 pub struct Stage<'a> {
-    /// Derivation from the model before it.
+    /// States how the model was derived from the model before it.
     pub way: Way,
     /// Name of the model.
     pub model: &'a str,
@@ -65,7 +67,7 @@ pub struct Subject<'a> {
     pub seen: Seen,
     /// Effects that the last model has and the first model lacks, each with its most significant coefficient.
     pub effects: Vec<Decisive>,
-    /// Name and errors of a forecast without aerodynamics.
+    /// Name and errors of a forecast without aerodynamics, for comparison; `None` without a forecast.
     pub baseline: Option<(&'a str, &'a [HorizonScore])>,
 }
 

@@ -1,4 +1,7 @@
-//! Numbers of an answer: errors, their changes, coefficients of the added effects.
+//! Numbers of an answer, which is the summary of a comparison: errors, their changes, coefficients of the added effects.
+//!
+//! Errors are those of free runs (open-loop simulations from measured states). The models form a sequence: the given model,
+//! then models derived from it or compared with it.
 
 use serde::Serialize;
 
@@ -33,7 +36,7 @@ pub struct Step {
     pub change_percent: Option<f64>,
 }
 
-/// The most significant coefficient of an effect.
+/// An effect with its most significant coefficient.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Decisive {
     /// Identifier of the effect.
@@ -54,7 +57,8 @@ pub struct Decisive {
 }
 
 impl Decisive {
-    /// Significance: magnitude of `value` divided by the width of its 95 % interval. 0 if the quotient is not finite.
+    /// Significance of a coefficient: magnitude of `value` divided by the width of its 95 % interval. 0 if the quotient is not
+    /// finite.
     pub fn clearness(value: f64, ci95: [f64; 2]) -> f64 {
         let clear = value.abs() / (ci95[1] - ci95[0]);
         if clear.is_finite() { clear } else { 0.0 }
@@ -63,8 +67,8 @@ impl Decisive {
 
 /// The state whose root mean square error, relative to its scale x_c, decreases most.
 ///
-/// If effects were added to the last model, it is compared with the model before it. Otherwise it is compared with the
-/// first model.
+/// The last model is compared with the model before it if effects were added to it. Otherwise it is compared with the first
+/// model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct InUse {
     /// State with its unit, as in `State::NAMES`.
@@ -75,7 +79,7 @@ pub struct InUse {
     pub after: f64,
 }
 
-/// The state with the largest remaining error relative to its scale.
+/// The state with the largest error of the last model relative to its scale x_c.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Left {
     /// State with its unit, as in `State::NAMES`.
@@ -84,12 +88,12 @@ pub struct Left {
     pub rmse: f64,
 }
 
-/// A forecast without aerodynamics.
+/// A baseline forecast that uses no aerodynamics, for example the held initial state.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Baseline {
     /// Name of the forecast.
     pub name: String,
-    /// NRMSE of the forecast at the horizon.
+    /// NRMSE of the forecast at the horizon of the answer.
     pub error: f64,
 }
 
@@ -100,15 +104,15 @@ pub struct Numbers {
     pub horizon_s: f64,
     /// Names of the flights.
     pub flights: Vec<String>,
-    /// Number of these flights to which a model was fitted; `None` (null) if it is unknown.
+    /// Number of these flights to which a model was fitted; `None` (null) if this is unknown.
     pub fitted_flights: Option<usize>,
-    /// Whether the flights are the last third of a flight whose first two thirds were fitted.
+    /// Whether the flights are the last third of a flight to whose first two thirds the model was fitted.
     pub last_third: bool,
     /// The models, from the given model to the last model; empty if no horizon is reached.
     pub steps: Vec<Step>,
     /// Change of the error from the first to the last model, %; NaN (null) for a single model.
     pub change_percent: f64,
-    /// The best forecast without aerodynamics; `None` if the answer has none, or if no run of the forecast reaches the horizon.
+    /// The best baseline forecast; `None` if the answer has none, or if no run of the forecast reaches the horizon.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub baseline: Option<Baseline>,
     /// Effects that the last model has and the first model lacks.
@@ -159,7 +163,7 @@ impl Numbers {
     }
 }
 
-/// The longest horizon up to [`ANSWER_S`] that runs of every model reach, s. If there is none, the shortest horizon that runs
+/// The longest horizon up to [`ANSWER_S`], s, that runs of every model reach. If there is none, the shortest horizon that runs
 /// of every model reach.
 fn horizon(stages: &[Stage]) -> Option<f64> {
     let first = stages.first()?;

@@ -1,8 +1,9 @@
-//! Wording of the sentences of an answer, from its numbers.
+//! Sentences and phrases of the answer to a comparison or refit, composed from its numbers. The error is that of free runs
+//! (open-loop simulations) at a horizon.
 
 use super::numbers::{Decisive, InUse, Left, Numbers, Step, Way};
 
-/// Sentence on the free-run error and its change from model to model.
+/// Sentence on the error of the models and its change from one model to the next.
 pub fn error(n: &Numbers) -> String {
     let Some((first, rest)) = n.steps.split_first() else {
         return "No free run is long enough for an error to be given.".into();
@@ -54,7 +55,7 @@ pub fn error(n: &Numbers) -> String {
     text + "."
 }
 
-/// The error of a single model, compared with the error of the best forecast without aerodynamics.
+/// Part of a sentence with the error of a single model, compared with that of the best forecast without aerodynamics.
 fn beside_baseline(n: &Numbers, error: f64) -> String {
     let text = format!(" is {}", number(error));
     let Some(b) = &n.baseline else { return text };
@@ -69,7 +70,7 @@ fn beside_baseline(n: &Numbers, error: f64) -> String {
     format!("{text}, {beside} the best forecast without aerodynamics ({}), {best}", b.name)
 }
 
-/// Sentences on the effects with their most significant coefficients, and on the state whose prediction improves most.
+/// Sentences on each added effect with its most significant coefficient, and on the state whose prediction improves most.
 pub fn effect(n: &Numbers) -> String {
     let mut said: Vec<String> = n.effects.iter().map(one).collect();
     let subject = match (n.steps.len(), n.effects.len()) {
@@ -97,7 +98,7 @@ fn one(e: &Decisive) -> String {
     text
 }
 
-/// A value and the ends of its interval with the same number of decimal places, enough for two digits of the interval's
+/// Texts of a value and the ends of its interval with the same number of decimal places, enough for two digits of the interval's
 /// width.
 fn alike(value: f64, ci95: [f64; 2]) -> [String; 3] {
     let width = ci95[1] - ci95[0];
@@ -140,7 +141,7 @@ pub fn left(n: &Numbers) -> String {
     })
 }
 
-/// The answer as a short phrase.
+/// The change of the error as a short phrase.
 pub fn summary(n: &Numbers) -> String {
     let at = format!("error at {} s", number(n.horizon_s));
     match &n.steps[..] {

@@ -1,4 +1,4 @@
-//! Tests of the ARX forecast on flights whose pitch rate is linear, of second order.
+//! Tests of the ARX forecast on flights whose pitch rate follows a linear second-order recursion.
 
 use super::*;
 use crate::flight_path::reconstruction::{Reconstruction, Segment};
@@ -44,7 +44,7 @@ fn a_second_order_flight_is_predicted_by_order_two_which_is_chosen() {
         let arx = Arx::fit(seen, of_order(order)).unwrap();
         arx.scores(unseen, [1.0; 8], &[1.0, 5.0]).unwrap()[1].rmse_scaled
     };
-    // the pitch rate varies by 0.04 rad/s; numpy gives 0.010 and 1e-16 for the same two fits
+    // the pitch rate varies by 0.04 rad/s; numpy gives errors of 0.010 and 1e-16 for the same two fits
     let [first, second] = [1, 2].map(error);
     assert!(first > 1e-3 && second < 1e-8, "{first} {second}");
     assert_eq!(choose(&flights, [1.0; 8], &[1.0, 5.0]), Ok(of_order(2)));
@@ -64,7 +64,7 @@ fn a_free_run_is_the_recursion_by_hand() {
     slopes[(q, 24)] = 0.1;
     let arx = Forecast::Linear(Arx { order: 2, substeps: flight.substeps, slopes });
     let recorded = |k: usize| (segment[k].state.q, segment[k].controls.elevator);
-    // the run from sample 0 has no sample before it: sample 0 stands for that
+    // no sample precedes sample 0: in the run from there, sample 0 also serves as the preceding sample
     for start in [0_usize, 5] {
         let (mut now, mut last) = (recorded(start).0, recorded(start.saturating_sub(1)).0);
         let mut by_hand = Vec::new();

@@ -1,4 +1,7 @@
-//! Advice on the manoeuvres of the next flight.
+//! Advice on the manoeuvres of the next flight, from the result of a diagnosis.
+//!
+//! The evidence of a candidate effect is its test statistic. A candidate whose evidence exceeds its threshold may be asserted
+//! as missing in the model.
 
 use crate::diagnose::answer::result::{Advice, Candidate, ChannelLeft, Verdict};
 use crate::diagnose::answer::sentences::figures;
@@ -6,7 +9,7 @@ use crate::diagnose::search::stepwise::Found;
 use crate::per_flight::askew;
 use greylag_physics::catalogue::describe;
 
-/// Largest number of recommendations for candidates whose evidence is near the critical value.
+/// Largest number of recommendations for candidates whose evidence is not far below the threshold.
 const UNSEEN: usize = 2;
 /// Manoeuvres for an effect whose file states none.
 const ONE_BY_ONE: &str = "flights that move its variables one by one, at two airspeeds";
@@ -70,13 +73,13 @@ pub fn advice(
     list
 }
 
-/// The pair for `greylag design --between`; `None` if one of the two is the misalignment of the axes, which is no
+/// The pair of effects for `greylag design --between`. `None` if one of the two is the misalignment of the axes, which is no
 /// effect of the catalogue.
 fn designable(a: &str, b: &str) -> Option<[String; 2]> {
     [a, b].iter().all(|id| *id != askew::ID).then(|| [a.to_owned(), b.to_owned()])
 }
 
-/// Manoeuvres that distinguish the effect `id` from others. If its effect file states none, a general recommendation.
+/// Manoeuvres that distinguish the effect `id` from others. If none are stated for the effect, a general recommendation.
 fn separating(id: &str) -> String {
     let stated = describe(id).and_then(|a| a.entry).map_or("", |e| e.separated_by);
     (if stated.is_empty() { ONE_BY_ONE } else { stated }).to_owned()

@@ -1,5 +1,6 @@
-//! Curve of an effect's contribution over the flight variable (regime variable) that explains most of the
-//! contribution's variance.
+//! Curve of an effect's contribution to a force or moment, over the regime variable that explains most of the contribution's
+//! variance. Regime variables describe the flight condition, for example the angle of attack. The values are means over windows,
+//! which are short intervals of a flight.
 
 use crate::compare::{ChannelId, RegimeVariable};
 use crate::diagnose::answer::result::Curve;
@@ -11,14 +12,15 @@ const PLACES: usize = 12;
 /// Number of bins of equal width for the curve. Bins of equal count would not reach the ends of the range, where windows are
 /// sparse.
 const WIDTHS: usize = 24;
-/// Variables that do not describe the flight state and are not plotted.
+/// Regime variables that do not describe the state of the aircraft. Curves are not plotted over them.
 const NOT_SHOWN: [RegimeVariable; 3] =
     [RegimeVariable::Altitude, RegimeVariable::Time, RegimeVariable::Flight];
 
-/// Computes the curve of `contribution` (one entry for each flight) in the first of `channels`.
+/// Computes the curve of an effect in the first of `channels`. `contribution` holds the effect's contribution in each window of
+/// each flight.
 ///
-/// `relative` is the relative standard deviation of the contribution. `left` states whether the residual of the round
-/// still contains the contribution. `None` if there is no channel or no window.
+/// `relative` is the standard deviation of the contribution relative to its value. `left` states whether the residual of the
+/// round still contains the contribution. `None` if there is no channel or no window.
 pub fn curve(
     round: &Round,
     contribution: &[Column],
@@ -48,9 +50,9 @@ pub fn curve(
 /// Computes the curve of an effect in the channel `id` over the regime variable that explains most of the
 /// contribution's variance.
 ///
-/// For each window, `made` is the contribution and `scatter` is measured − model without the effect, both in the
-/// channel's unit. `regimes` holds the windows' regime variables. `relative` is the relative standard deviation of the
-/// contribution.
+/// `made` holds the contribution in each window, and `scatter` the measured value minus that of the model without the effect,
+/// both in the channel's unit. `regimes` holds the regime variables of each window. `relative` is the standard deviation of the
+/// contribution relative to its value.
 pub fn over_the_best(
     id: ChannelId,
     made: Vec<f64>,
@@ -84,7 +86,7 @@ pub fn over_the_best(
     })
 }
 
-/// Means of `x` and `y` in bins of equal count over `x`, with the count, which is smaller in the last bin.
+/// Means of `x` and `y` in bins of equal count along `x`, with the count. The last bin may be smaller.
 fn bins(y: &[f64], x: &[f64]) -> Vec<[f64; 3]> {
     let mut order: Vec<usize> = (0..x.len()).collect();
     order.sort_by(|a, b| x[*a].total_cmp(&x[*b]));
@@ -94,7 +96,7 @@ fn bins(y: &[f64], x: &[f64]) -> Vec<[f64; 3]> {
     order.chunks(size).map(|bin| [mean(bin, x), mean(bin, y), bin.len() as f64]).collect()
 }
 
-/// Means of `x` and `y` in bins of equal width over the whole range of `x`. Empty bins are left out.
+/// Means of `x` and `y` in bins of equal width over the whole range of `x`. Empty bins are omitted.
 fn over_the_range(y: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
     let (low, high) =
         x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
@@ -108,7 +110,7 @@ fn over_the_range(y: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
     filled.map(|[x, y, count]| [x / count, y / count]).collect()
 }
 
-/// Share of the variance of `y` that lies between the bins over `x` (correlation ratio).
+/// Fraction of the variance of `y` that lies between the bins along `x` (correlation ratio).
 fn explained(y: &[f64], x: &[f64]) -> f64 {
     let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
     let all: f64 = y.iter().map(|v| (v - mean).powi(2)).sum();
@@ -129,7 +131,7 @@ mod tests {
         let y: Vec<f64> = x.iter().map(|x| x * x).collect();
         let curve = over_the_range(&y, &x);
         let (first, last) = (curve[0], curve[curve.len() - 1]);
-        // a bin is 0.8 wide: the means of the end bins lie within 0.8 of the ends
+        // a bin is 0.8 wide, so the means of the end bins lie within 0.8 of the ends
         assert!(first[0] < -9.2 && last[0] > 7.2, "{first:?} {last:?}");
         assert!((first[1] - first[0].powi(2)).abs() < 0.2);
     }

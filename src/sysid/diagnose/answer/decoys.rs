@@ -1,5 +1,6 @@
-//! Placebo regressors (decoys), which cannot be effects: regressors of candidates, reversed in time or with random
-//! phases.
+//! Placebo regressors (decoys), which check a diagnosis for false detections. They are made from the regressors of candidates
+//! (effects that the model may lack), by reversal in time or by randomised phases. They cannot be effects, so they should have
+//! little evidence.
 
 use std::f64::consts::TAU;
 
@@ -14,16 +15,16 @@ use crate::diagnose::search::round::Round;
 use crate::diagnose::search::stepwise::Found;
 use greylag_num::stream::{Stream, stream};
 
-/// Number of the random stream for the phases.
+/// Number that separates the random stream of the phases from others with the same seed.
 const DECOYS: u64 = 84;
 /// Largest number of candidates from which placebo regressors are made.
 const MOST: usize = 6;
-/// Longest series, in windows, that is transformed at once. Longer series are randomized in pieces to limit the cost of the
-/// transform.
+/// Longest series whose phases are randomised at once, in windows (short stretches of flight over which data are averaged).
+/// Longer series are divided, to limit the cost of the Fourier transform.
 const PIECE: usize = 256;
 
-/// Makes placebo regressors from the best candidates of the last round that have a single coefficient. Returns their
-/// evidence.
+/// Makes placebo regressors from the best candidates in the last round of the search, and computes their evidence. Only
+/// candidates with a single coefficient are used.
 pub fn decoys(found: &Found, seed: u64) -> Vec<Decoy> {
     let round = found.round();
     let mut random = stream(seed, &[DECOYS]);
@@ -81,7 +82,7 @@ fn evidence(round: &Round, names: &[(String, Trial)], lists: &[Vec<Column>]) -> 
     names.iter().enumerate().filter_map(of).collect()
 }
 
-/// Returns a series with the spectrum of `x` and random phases, piece by piece.
+/// A series with the amplitude spectrum of `x` and random phases, made piece by piece.
 fn shuffle(x: &[f64], random: &mut Stream) -> Vec<f64> {
     x.chunks(PIECE).flat_map(|piece| shuffle_piece(piece, random)).collect()
 }

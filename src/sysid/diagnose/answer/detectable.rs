@@ -1,4 +1,5 @@
-//! Minimum detectable effect: the smallest amount of each effect that the flights would show.
+//! Minimum detectable effect: the smallest amount of each effect that the flights would show. Evidence is the test statistic
+//! of an effect.
 //!
 //! For an effect that is linear in its coefficients, this amount follows from the standard deviations of the
 //! coefficients. The contribution of an input effect is not proportional to its amount near zero: a small lag is
@@ -73,8 +74,8 @@ impl Shown {
     }
 }
 
-/// Search for the smallest detectable amount of an effect on the deflections. A size is an amount, or its reciprocal if
-/// larger amounts are weaker effects.
+/// Search for the smallest detectable amount of an input effect. The search varies its size: the amount, or the reciprocal of
+/// the amount if larger amounts are weaker effects.
 struct Sought<'a> {
     entry: &'a Entry,
     trial: &'a Trial,
@@ -128,7 +129,7 @@ impl<'a> Sought<'a> {
             return;
         }
         let ratio = ratio.max(1e-6);
-        // at a bound, the same size is evaluated twice
+        // at a bound the size does not change, so that no exponent follows from the two evaluations
         let other = self.last.filter(|[size, _]| *size != self.size);
         let power = other.map_or(POWER, |[size, before]| {
             ((ratio / before).ln() / (self.size / size).ln()).clamp(POWERS[0], POWERS[1])
@@ -261,7 +262,7 @@ mod tests {
                 assert!((found / amount - 1.0).abs() < 1.1 * CLOSE, "{id}: {found} for {amount}");
             }
         }
-        // a lower limit is a larger effect
+        // the lower a rate limit is, the stronger is its effect
         let found = sought("rate_limit", 3.0, 2.0).unwrap();
         assert!((found / 3.0 - 1.0).abs() < 1.1 * CLOSE, "{found}");
     }

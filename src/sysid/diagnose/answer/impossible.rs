@@ -1,23 +1,24 @@
-//! Checks for physically impossible estimates. If one estimate is impossible, no statement about forces is valid.
+//! Checks of the estimates of a diagnosis for physically impossible values: constants of sensors and wind in each flight, and
+//! coefficients of the model. If one is impossible, the diagnosis makes no statement about forces and moments.
 
 use crate::diagnose::answer::result::Tuned;
 use crate::diagnose::answer::sentences::with_interval;
 use crate::flight_path::reconstruction::{Nuisance, Reconstruction};
 use greylag_num::statistics::mean;
 
-/// Range of airspeed scales (measured / true) of a working pitot tube. A badly placed static port causes errors of 10
+/// Plausible range of the airspeed scale, the ratio of measured to true airspeed. A badly placed static port causes errors of 10
 /// to 15 %.
 const SCALES: [f64; 2] = [0.8, 1.25];
 /// Largest plausible mean vertical wind over a flight, m/s. The mean over the up- and downdraughts of thermals is small.
 const VERTICAL_MPS: f64 = 3.0;
-/// Largest plausible distance of a constant from its prior mean, in prior standard deviations.
+/// Largest plausible distance of an estimated constant from its prior mean, in prior standard deviations.
 const BELIEVED: f64 = 6.0;
-/// Number of standard deviations by which an estimate must exceed a limit to count as impossible.
+/// Number of its standard deviations by which an estimate must exceed a limit to count as impossible.
 const SURELY: f64 = 4.0;
-/// A lift slope below this share of its prior mean is implausible.
+/// A lift slope below this fraction of its prior mean counts as impossible.
 const NO_WING: f64 = 0.2;
 
-/// A sentence for each impossible estimate, with advice on what to check.
+/// A sentence for each impossible estimate in `flights` and among the coefficients `tuned`, with advice on what to check.
 pub fn impossible(flights: &[&Reconstruction], tuned: &[Tuned]) -> Vec<String> {
     let of_flight = |flight: &&Reconstruction| {
         let speeds: Vec<f64> = flight
@@ -38,7 +39,7 @@ fn sentence(flight: &str, n: &Nuisance, why: &str) -> String {
     format!("{flight}: {} is found at {}: {why}.", n.name, with_interval(n.value, n.sd, n.unit))
 }
 
-/// Reason why the estimate of a constant is impossible, with advice on what to check; `None` if it is possible.
+/// The reason why the estimate of a constant is impossible, with advice on what to check; `None` if it is possible.
 fn why(n: &Nuisance) -> Option<&'static str> {
     let name = n.name.as_str();
     let beyond =
@@ -62,7 +63,8 @@ fn why(n: &Nuisance) -> Option<&'static str> {
     }
 }
 
-/// Sentence on a mean wind that is faster than the mean airspeed (m/s); `None` if the wind is slower.
+/// A sentence on an estimated wind that is faster than the mean airspeed `airspeed` (m/s). `None` if it is slower or was not
+/// estimated.
 fn wind(flight: &Reconstruction, airspeed: f64) -> Option<String> {
     let of = |name: &str| {
         flight.nuisances.iter().find(|n| n.name == name).filter(|n| n.moved().abs() > 0.0)
@@ -79,7 +81,7 @@ fn wind(flight: &Reconstruction, airspeed: f64) -> Option<String> {
     })
 }
 
-/// Sentence on a damping derivative with the wrong sign or a lift slope near zero; `None` for other coefficients.
+/// A sentence on a damping derivative with the wrong sign or on a lift slope near zero; `None` for any other estimate.
 fn coefficient(t: &Tuned) -> Option<String> {
     let own = t.name.rsplit('.').next()?;
     let damps = ["Cmq", "Clp", "Cnr"].contains(&own);

@@ -1,11 +1,12 @@
-//! Sensor errors and wind of each flight, as estimated by the flight-path reconstruction without aerodynamics.
+//! Sensor errors and wind of each flight. The flight-path reconstruction estimates them from kinematics, without
+//! aerodynamics.
 
 use crate::diagnose::answer::result::Measurement;
 use crate::flight_path::reconstruction::{Nuisance, Reconstruction};
 
-/// Kinds of constants: prefix of the name, identifier in the catalogue, nominal value, and largest negligible deviation
-/// from it in the constant's unit. A negligible deviation is no larger than the errors of the reconstruction or a usual
-/// trim.
+/// Kinds of estimated constants, each with the prefix of its name, its identifier in the catalogue, its nominal value, and
+/// the largest negligible deviation from that value, in the constant's unit. Errors of the reconstruction and usual trims
+/// cause deviations of this size.
 const KINDS: [(&str, &str, f64, f64); 15] = [
     ("gyro_bias", "imu_bias", 0.0, 0.005),
     ("gyro_drift", "imu_bias", 0.0, 5e-5),
@@ -23,13 +24,13 @@ const KINDS: [(&str, &str, f64, f64); 15] = [
     ("skew_actuators", "actuators_late", 0.0, 0.015),
     ("skew_", "clock_skew", 0.0, 0.005),
 ];
-/// Number of standard deviations beyond which a constant differs from its nominal value.
+/// A constant differs significantly from its nominal value if the deviation exceeds this number of standard deviations.
 const CLEARLY: f64 = 4.0;
 
 /// Returns the sensor errors and the wind of each flight.
 ///
-/// A delay of the actuator record is never asserted here, because it may be a property of the aircraft. The search for
-/// effects decides on it.
+/// A delay of the recorded actuator positions is never asserted here, because it may be a property of the aircraft. The
+/// search for missing effects decides on it.
 pub fn measurement(flights: &[&Reconstruction]) -> Vec<Measurement> {
     let of = |flight: &&Reconstruction| {
         let name = flight.name.clone();

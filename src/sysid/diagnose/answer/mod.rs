@@ -1,4 +1,4 @@
-//! The result of a diagnosis: verdict, ranking, confidence intervals, and sentences that state them.
+//! The result of a diagnosis, which finds effects that a model lacks: verdict, ranking, confidence intervals, and sentences.
 
 pub(super) mod advice;
 pub(super) mod curves;

@@ -1,5 +1,7 @@
-//! Constants of each flight that are estimated together with the aerodynamics: trims, and misalignment angles of the
-//! sensors.
+//! Constants of each flight that are estimated together with the aerodynamics: trims, and misalignment angles of the sensors.
+//!
+//! A round is a linearisation of the model over all flights. Its nuisance parameters are the model's coefficients, the
+//! constants of the flights and the sensor errors.
 
 use std::collections::HashSet;
 
@@ -11,7 +13,8 @@ use crate::diagnose::search::round::Round;
 use crate::per_flight::{Constant, askew};
 use greylag_num::statistics::correlation_length;
 
-/// A constant is significant if it differs from zero by more than this number of standard deviations.
+/// A constant is significant if it differs from its reference by more than this number of standard deviations. The reference is
+/// zero for an angle, and the mean over the flights for a trim.
 const CLEARLY: f64 = 4.0;
 /// A constant is implausible if it differs from zero by more than this number of prior standard deviations. It then
 /// probably compensates for a missing effect.
@@ -21,7 +24,8 @@ const MOUNTED: f64 = 0.5 * std::f64::consts::PI / 180.0;
 /// Smallest standard deviation of a misalignment angle, rad. In simulated flights with aligned axes, the estimates were wrong
 /// by 0.05°; in a fit together with a misaligned flight, by up to 0.34°.
 const LEAST: f64 = 0.15 * std::f64::consts::PI / 180.0;
-/// A trim below this share of its prior standard deviation is negligible.
+/// A trim is negligible if it differs from the mean over the flights by less than this fraction of its prior standard
+/// deviation.
 const MATTERS: f64 = 0.2;
 
 /// Misalignment angles of each flight in `round`; empty unless they were estimated.
@@ -70,7 +74,7 @@ pub fn trims(round: &Round) -> Vec<FlightTrim> {
         .collect()
 }
 
-/// Estimate of a constant of a flight.
+/// Estimate of one constant of one flight.
 struct Fitted {
     flight: String,
     /// Index among the flight's constants.
@@ -82,14 +86,14 @@ struct Fitted {
 }
 
 impl Fitted {
-    /// Whether the constant's distance from zero is implausible.
+    /// Whether the constant is implausibly far from zero.
     fn is_implausible(&self) -> bool {
         self.value.abs() > BELIEVED * self.constant.width
     }
 }
 
-/// Flights with an implausible constant. No constant of these flights is asserted: the implausible constant compensates
-/// for another cause, and the constants correlated with it are not reliable.
+/// Flights with an implausible constant. No constant of these flights is asserted: the implausible constant probably
+/// compensates for another cause, and the constants correlated with it are not reliable.
 fn astray(fitted: &[Fitted]) -> HashSet<String> {
     fitted.iter().filter(|f| f.is_implausible()).map(|f| f.flight.clone()).collect()
 }
@@ -108,7 +112,7 @@ fn fitted(round: &Round) -> Vec<Fitted> {
         let places: Vec<usize> = (0..flights).map(|k| place(k, which)).collect();
         let own = places[flight];
         let share = 1.0 / flights as f64;
-        // the mean over all flights is confounded with the model's coefficient: differences from this mean are more
+        // the mean over all flights is confounded with the model's coefficient, so that differences from this mean are more
         // certain
         let weights: Vec<f64> =
             (0..flights).map(|k| f64::from(u8::from(k == flight)) - share).collect();
@@ -134,11 +138,11 @@ fn fitted(round: &Round) -> Vec<Fitted> {
         .collect()
 }
 
-/// Robust covariance of the nuisance parameters by a sandwich estimate. Each row is weighted by the residual's mean
-/// square times its correlation length in the same flight and channel.
+/// Robust covariance of the nuisance parameters by a sandwich estimate. Each row of the regression is weighted by the mean
+/// square of the residual times its correlation length, both for the same flight and channel.
 ///
-/// The noise of a channel is whitened in the same way in all flights. In a flight with a larger or slower residual than
-/// the others, this would underestimate the uncertainty.
+/// The noise of a channel is whitened in the same way in all flights. In a flight with a larger or slower residual than the
+/// others, the plain covariance would therefore underestimate the uncertainty.
 fn sandwich(round: &Round) -> DMatrix<f64> {
     let p = &round.projected;
     let count = round.known.len();
@@ -170,7 +174,7 @@ fn sandwich(round: &Round) -> DMatrix<f64> {
     &p.covariance * meat * &p.covariance
 }
 
-/// Root mean square of the flight's whitened residual; at least 1, the value for noise. If an effect is missing,
+/// Root mean square of the flight's whitened residual, at least 1, which is the value for noise. If an effect is missing, the
 /// estimates are less certain than the noise suggests.
 fn misfit(round: &Round, flight: usize) -> f64 {
     let of = round.projected.by_channel.iter().zip(&round.cells.flight_of_block);

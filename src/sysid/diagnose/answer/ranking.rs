@@ -1,4 +1,5 @@
-//! List of candidate effects with the results of their checks.
+//! List of the candidate effects with their estimates and the results of their checks. A candidate with enough evidence is
+//! asserted if it passes all checks, and refused otherwise.
 
 use std::collections::BTreeMap;
 
@@ -58,8 +59,8 @@ pub fn candidates(found: &Found, options: &Options) -> Vec<Candidate> {
     list
 }
 
-/// Ids of asserted effects whose coefficients may all be zero (95 %) in the joint fit of all effects, because another
-/// effect explains the same residual. Shape constants (nonlinear coefficients) do not count.
+/// Ids of those asserted effects whose coefficients may all be zero: in the joint fit of all effects, the 95 % intervals contain
+/// zero. In such a case another effect explains the same residual. Shape constants (nonlinear coefficients) do not count.
 pub fn void(found: &Found, options: &Options) -> Vec<String> {
     let lean = Options { detail: Detail::Lean, ..options.clone() };
     let asserted = found.selected.iter().filter(|s| s.refused.is_empty());
@@ -72,7 +73,8 @@ pub fn void(found: &Found, options: &Options) -> Vec<String> {
     candidates.filter(may_be_zero).map(|c| c.id).collect()
 }
 
-/// Smallest detectable amounts by effect. Effects that were added to the model keep the amounts of the first round.
+/// Smallest detectable amounts by effect id. An effect that was added to the model keeps the amount from the first round of the
+/// search.
 fn least(found: &Found) -> BTreeMap<&'static str, f64> {
     let mut least = detectable(&found.first, found.threshold);
     if let Some(last) = &found.last {
@@ -92,7 +94,8 @@ fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate>
     let parameters = about.coefficients.iter().enumerate().map(|(k, c)| {
         let [value, sd, sums] =
             fitted(found, s.id, c.name).unwrap_or([s.score.values[k], 0.0, 0.0]);
-        // the standard deviation of the round that selected the effect includes the scatter between blocks
+        // of two standard deviations, the larger one is used: that of the joint fit, or that of the round of the search that
+        // selected the effect, which includes the scatter between blocks of data
         let fitted = parameter(&about, k, value, sd.max(s.score.deviations[k]).hypot(sums));
         Parameter { by_flight: of_coefficient(round, &s.by_flight, k), ..fitted }
     });
@@ -131,8 +134,8 @@ fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate>
     })
 }
 
-/// Value of the coefficient `name` of the added effect `id`, and its standard deviations due to noise and due to
-/// discretisation. `None` if the model does not contain it.
+/// Value of the coefficient `name` of the effect `id` in the model, its standard deviation due to noise, and that due to
+/// discretisation. `None` if the model does not contain the effect.
 fn fitted(found: &Found, id: &str, name: &str) -> Option<[f64; 3]> {
     let round = found.round();
     let full = format!("{id}.{name}");
@@ -151,7 +154,7 @@ fn fitted(found: &Found, id: &str, name: &str) -> Option<[f64; 3]> {
 
 fn open(found: &Found, trial: &Trial, score: &Score, about: &Description) -> Candidate {
     let round = found.round();
-    // below the critical value, the estimates by flight are noise
+    // the estimates by flight are only noise if the evidence is below the critical value
     let by_flight = match score.evidence > found.threshold {
         true => checks::by_flight(round, trial, score),
         false => Vec::new(),
@@ -201,12 +204,13 @@ fn names(channels: &[usize]) -> Vec<String> {
     channels.iter().map(|c| NAMES[*c].to_owned()).collect()
 }
 
-/// Estimates of the first free coefficient from each flight.
+/// Estimates of the first free coefficient, one for each flight. `all` holds the estimates of every free coefficient by its
+/// index.
 fn of_first(round: &Round, all: &[(usize, Vec<[f64; 2]>)]) -> Vec<FlightEstimate> {
     all.first().map_or_else(Vec::new, |(_, values)| flights(round, values))
 }
 
-/// Estimates of coefficient `k` from each flight; empty if it was not free.
+/// Estimates of coefficient `k`, one for each flight; empty if the coefficient was not free.
 fn of_coefficient(round: &Round, all: &[(usize, Vec<[f64; 2]>)], k: usize) -> Vec<FlightEstimate> {
     let own = all.iter().find(|(index, _)| *index == k);
     own.map_or_else(Vec::new, |(_, values)| flights(round, values))

@@ -1,4 +1,6 @@
-//! The result of a diagnosis, serialized to JSON (`greylag.diagnosis/1`).
+//! The result of a diagnosis, serialised to JSON (`greylag.diagnosis/1`). A diagnosis compares a model with flights and finds
+//! effects that the model lacks. A candidate is an effect that the model may lack. An effect is asserted if the diagnosis states
+//! that the model lacks it.
 
 use serde::Serialize;
 
@@ -14,9 +16,9 @@ pub enum Verdict {
     Adequate,
     /// Something is missing, but no effect of the catalogue explains it.
     Unexplained,
-    /// The flights allow no verdict. This has one of four reasons: an estimate is physically impossible, the remaining
-    /// sensor errors may account for the residual in every channel, the given model has no certain error, or a flexible
-    /// model of the states removes little of the residual.
+    /// The flights allow no verdict. There are four possible reasons: an estimate is physically impossible, sensor errors may
+    /// account for the residual in every channel, no error of the given model is certain, or a flexible model of the states
+    /// removes little of the residual.
     Unknown,
 }
 
@@ -26,13 +28,14 @@ pub enum Verdict {
 /// impossible, `verdict` is [`Verdict::Unknown`], and no effect is asserted. Then read `effects`: its `asserted`
 /// entries come first, in the order of selection. `sentences` state the same results in words.
 ///
-/// Some parts depend on the options. `trims`, and the misalignment angles in `measurement`, are filled if constants of
-/// each flight were estimated. `decoys` and the candidates' curves are filled with
+/// Some parts depend on the options. `trims`, and the misalignment angles in `measurement`, exist only if constants of each
+/// flight were estimated. `decoys` and the candidates' curves exist only with
 /// [`Detail::Full`](crate::diagnose::Detail::Full).
 ///
-/// Values are in SI units unless a `unit` is given. The channels D, L, Y are forces (N); l, m, n are moments (N m). A
-/// number that does not exist is NaN, which JSON writes as `null`. Flights are named after their file. Equal inputs,
-/// options and versions give equal results, because `settings.seed` determines all random draws.
+/// Values are in SI units unless a `unit` is given. The channels D, L, Y are forces (N); l, m, n are moments (N m). Their
+/// residuals are measured minus predicted values, averaged over windows (short stretches of flight). A number that does not
+/// exist is NaN, `null` in JSON. Flights are named after their file. Equal inputs, options and versions give equal results,
+/// because `settings.seed` determines all random draws.
 #[derive(Clone, Debug, Serialize)]
 pub struct Diagnosis {
     /// Schema of the document, `greylag.diagnosis/1`.
@@ -49,24 +52,24 @@ pub struct Diagnosis {
     pub doubtful: Vec<String>,
     /// Every candidate: the asserted ones first, in the order of their selection, then the others by evidence.
     pub effects: Vec<Candidate>,
-    /// Unexplained share of each channel under the re-estimated model with the added effects.
+    /// What the re-estimated model leaves unexplained in each channel, without and with the asserted effects.
     pub channels: Vec<ChannelLeft>,
-    /// Sensor errors and wind of each flight, estimated without aerodynamics. If requested, also misalignment angles of
-    /// the axes (`axes_askew`), estimated together with the aerodynamics.
+    /// Sensor errors and wind of each flight, estimated from kinematics alone. If requested, also misalignment angles of the
+    /// sensor axes (`axes_askew`), estimated together with the aerodynamics.
     pub measurement: Vec<Measurement>,
     /// Trims of each flight, where they were estimated.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub trims: Vec<FlightTrim>,
-    /// The model's own coefficients, re-estimated with the added effects in the model.
+    /// The model's own coefficients, re-estimated with the asserted effects in the model.
     pub tuned: Vec<Tuned>,
     /// Advice on the next flight, the most useful first.
     pub advice: Vec<Advice>,
-    /// Evidence in bootstrap draws under the null hypothesis. It determines the critical values.
+    /// Evidence in bootstrap draws under the null hypothesis that no effect is missing. It determines the critical values.
     pub nulls: Nulls,
     /// Placebo regressors (decoys), which check for false detections.
     pub decoys: Vec<Decoy>,
-    /// Share of the residual variance beyond noise that a flexible model could still remove after the asserted effects.
-    /// The flexible model is fitted to the other flights.
+    /// Share of the residual variance, without that of noise, that a flexible model still removes after the asserted effects.
+    /// The flexible model is fitted to other flights than those on which the share is computed.
     pub learnable_remainder: f64,
     /// Further notes for the reader.
     pub notes: Vec<String>,
@@ -83,10 +86,10 @@ pub struct Candidate {
     pub description: &'static str,
     /// Whether the diagnosis asserts that the model lacks the effect.
     pub asserted: bool,
-    /// Classification of the evidence.
+    /// Classification of the candidate.
     pub status: Status,
-    /// Evidence: the smaller of the penalised likelihood gain and the block-robust Wald statistic. It comes from the
-    /// round that selected the effect, or from the last round if the effect was not selected.
+    /// Evidence: the smaller of the penalised likelihood gain and the block-robust Wald statistic. Effects are selected one per
+    /// round. The evidence is that of the round in which the effect was selected, otherwise that of the last round.
     pub evidence: f64,
     /// Critical value of the evidence, from bootstrap draws under the null hypothesis that no effect is missing.
     pub threshold: f64,
@@ -96,24 +99,24 @@ pub struct Candidate {
     pub channels: Vec<String>,
     /// Ids of effects that these data cannot distinguish from this effect.
     pub indistinguishable_from: Vec<String>,
-    /// Share of the residual variance beyond noise that the effect removes from blocks that the fit did not use; NaN
-    /// (null) if not computed.
+    /// Share of the residual variance, without that of noise, that the effect removes in blocks (stretches of about 4 s) that
+    /// its fit did not use. NaN if not computed.
     pub heldout_error_reduction: f64,
-    /// Share of block bootstraps in which the effect ranks first; NaN (null) if not computed.
+    /// Share of block bootstraps in which the effect, or one that cannot be distinguished from it, ranks first. NaN if not
+    /// computed.
     pub selected_in_bootstraps: f64,
     /// Estimate of the first parameter from each flight alone.
     pub by_flight: Vec<FlightEstimate>,
-    /// Smallest amount of the first parameter that these flights would have shown, in its unit; `None` if there is no
-    /// such amount.
+    /// Smallest value of the first parameter that these flights would have shown, in its unit; `None` if there is no such value.
     pub minimum_detectable: Option<f64>,
     /// Reasons not to assert the effect although its evidence exceeds the critical value.
     pub refused: Vec<String>,
-    /// The effect's contribution over the flight variable that explains most of its variance. `None` for candidates of
-    /// low rank and with [`Detail::Lean`](crate::diagnose::Detail::Lean).
+    /// The effect's contribution as a function of the flight variable that explains most of its variance. `None` for candidates
+    /// that rank low, and with [`Detail::Lean`](crate::diagnose::Detail::Lean).
     pub curve: Option<Curve>,
 }
 
-/// Classification of a candidate's evidence.
+/// Classification of a candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
@@ -138,7 +141,7 @@ pub struct Parameter {
     pub value: f64,
     /// 95 % interval of `value`.
     pub ci95: [f64; 2],
-    /// Unit of `value`; it may include the parameter's meaning.
+    /// Unit of `value`, possibly with the parameter's meaning.
     pub unit: String,
     /// Estimate from each flight alone; empty if it was not computed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -156,7 +159,7 @@ pub struct FlightEstimate {
     pub sd: f64,
 }
 
-/// An effect's contribution over a flight variable (regime variable), with the residual that it explains.
+/// An effect's contribution to a channel as a function of a flight variable such as α, and the residual that it explains.
 #[derive(Clone, Debug, Serialize)]
 pub struct Curve {
     /// Name of the channel: D, L, Y, l, m or n.
@@ -165,33 +168,33 @@ pub struct Curve {
     pub variable: String,
     /// Unit of the channel.
     pub unit: String,
-    /// Value of the flight variable in each window.
+    /// Value of the flight variable in each window (a short stretch of flight).
     pub x: Vec<f64>,
     /// Measured value minus the prediction of the re-estimated model without the effect, in each window.
     pub residual: Vec<f64>,
     /// Values of the flight variable at which the contribution is given.
     pub at: Vec<f64>,
-    /// Mean contribution at these values, with the lower and upper end of its 95 % interval.
+    /// Mean contribution at each value in `at`, and the lower and upper end of its 95 % interval, in `unit`.
     pub contribution: Vec<[f64; 3]>,
 }
 
-/// Unexplained residual of one channel.
+/// What is left unexplained in one channel.
 #[derive(Clone, Debug, Serialize)]
 pub struct ChannelLeft {
     /// Name of the channel: D, L, Y, l, m or n.
     pub channel: String,
-    /// Unexplained share of the channel's variance beyond sensor noise, under the re-estimated model without effects.
+    /// Share of the channel's variance, without that of sensor noise, that the re-estimated model without added effects leaves
+    /// unexplained.
     pub tuned_unexplained_fraction: f64,
-    /// The same share under the re-estimated model with the added effects.
+    /// The same share for the re-estimated model with the asserted effects.
     pub unexplained_fraction: f64,
     /// Flight condition with the most significant mean residual, in words; `None` if no mean residual is significant.
     pub worst_regime: Option<String>,
-    /// Product of states or deflections that explains most of the remaining residual; `None` if this is not
-    /// significant.
+    /// Product of states or deflections that explains most of the remaining residual; `None` if none does so significantly.
     pub left_with: Option<String>,
     /// Whether these flights do not suffice to assess the given model in this channel.
     pub abstained: bool,
-    /// Reason why the channel cannot be assessed, if `abstained`.
+    /// The reason, if `abstained` is true.
     pub why_abstained: Option<String>,
 }
 
@@ -202,7 +205,7 @@ pub struct Measurement {
     pub flight: String,
     /// Identifier in the catalogue: `alpha_bias`, `airspeed_scale`, `steady_wind` and so on.
     pub id: String,
-    /// Name of the constant.
+    /// Name of the sensor error or wind component.
     pub name: String,
     /// Estimated value, in the unit `unit`.
     pub value: f64,
@@ -210,24 +213,24 @@ pub struct Measurement {
     pub sd: f64,
     /// Unit of the estimate `value`.
     pub unit: String,
-    /// Whether the constant differs significantly from its nominal value.
+    /// Whether `value` differs significantly from the nominal value.
     pub asserted: bool,
 }
 
-/// A trim coefficient of one flight, as a difference from the model's coefficient.
+/// A trim of one flight: an offset that is added to one of the model's coefficients in this flight.
 #[derive(Clone, Debug, Serialize)]
 pub struct FlightTrim {
     /// Name of the flight.
     pub flight: String,
     /// Name of the trim: `CD0`, `CL0`, `CY0`, `Cl0`, `Cm0`, `Cn0`, or `thrust_share`, a share of the model's thrust.
     pub name: String,
-    /// Prior standard deviation (prior mean zero).
+    /// Prior standard deviation. The prior mean is zero.
     pub prior_sd: f64,
-    /// Estimate, dimensionless, to be added to the model's coefficient.
+    /// Estimate of the trim, dimensionless.
     pub value: f64,
-    /// Standard deviation of `value`, the uncertainty of the model's own coefficient included.
+    /// Standard deviation of `value`, including the uncertainty of the model's own coefficient.
     pub sd: f64,
-    /// Estimate minus the mean of all flights, and its standard deviation; `None` for a single flight.
+    /// `value` minus the mean over all flights, and the standard deviation of this difference; `None` for a single flight.
     pub beside_mean: Option<[f64; 2]>,
     /// Whether the trim differs significantly from the mean of all flights, by a plausible amount.
     pub asserted: bool,
@@ -259,9 +262,9 @@ pub struct Advice {
     pub between: Option<[String; 2]>,
 }
 
-/// Bootstrap draws under the null hypothesis that no effect is missing, which determine the critical values. Each draw
-/// consists of the flights under the re-estimated model with resampled noise: the sign of the noise is random in each
-/// block. Errors of the coefficients are drawn from their prior.
+/// Bootstrap draws under the null hypothesis that no effect is missing. They determine the critical values. A draw consists of
+/// the same flights, with the residuals that they would have if the re-estimated model were right: noise whose sign is random in
+/// each block (stretch of about 4 s), and the effects of coefficient errors that are drawn from their prior.
 #[derive(Clone, Debug, Serialize)]
 pub struct Nulls {
     /// Number of bootstrap draws.
@@ -272,7 +275,7 @@ pub struct Nulls {
     pub level: f64,
 }
 
-/// A placebo regressor (decoy), which cannot be an effect.
+/// A placebo regressor (decoy): a regressor that cannot be an effect.
 #[derive(Clone, Debug, Serialize)]
 pub struct Decoy {
     /// Construction of the regressor, for example `drag_alpha2 reversed in time`.
@@ -290,9 +293,9 @@ pub struct Settings {
     pub nulls: usize,
     /// Number of block bootstraps.
     pub bootstraps: usize,
-    /// Ids excluded from the catalogue.
+    /// Ids of effects of the catalogue that were excluded.
     pub without: Vec<String>,
-    /// Constants estimated for each flight.
+    /// Constants that were estimated for each flight in addition to its sensor errors.
     #[serde(flatten)]
     pub per_flight: PerFlight,
 }

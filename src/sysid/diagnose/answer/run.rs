@@ -1,4 +1,7 @@
-//! The diagnosis: prepares the flights, runs the search, and assembles the result.
+//! The diagnosis of a model: which effects (groups of model terms) of a catalogue does it lack according to recorded flights?
+//! This module prepares the flights, runs the search and assembles the result.
+//!
+//! An effect that the search has found is refused if a check fails, and otherwise asserted. A channel is a force or a moment.
 
 use crate::compare::{self, ChannelId, unpredicted};
 use crate::diagnose::answer::advice;
@@ -29,21 +32,20 @@ use crate::weak_form::windows::{self, Series};
 use greylag_model::{GreyBox, RUDDER};
 use greylag_physics as physics;
 
-/// The verdict is that something is missing only if a flexible model could remove more than this share of the residual
-/// beyond noise. Errors of the reconstruction stay below it.
+/// If a flexible model (a regression without physics) could remove more than this fraction of the residual beyond noise, this is
+/// evidence that the model lacks something. Errors of the flight-path reconstruction stay below it.
 const WORTH_SAYING: f64 = 0.1;
-/// Smaller threshold that applies if an effect of the catalogue was refused for another reason than its small size.
+/// The same limit if an effect was refused for another reason than its small size.
 const REFUSED: f64 = 0.01;
-/// Reason to refuse every effect if an estimate is physically impossible.
+/// Reason for which all effects are refused if an estimate is physically impossible.
 const CANNOT_BE: &str =
     "a figure of these flights cannot be, so that nothing is said about forces and moments";
-/// Reason to refuse an effect if another effect explains the same residual.
+/// Reason for which an effect is refused if its coefficients may be zero when all effects are estimated together.
 const MAY_BE_ZERO: &str = "its 95 % interval holds zero once all effects have settled";
 
 /// Determines which effects of the catalogue `model` lacks according to `flights`.
 ///
-/// The flights must have been reconstructed with their deflections as recorded. `progress` is called at each stage and
-/// may cancel.
+/// The deflections of the reconstructed flights must be the recorded ones. `progress` is called at each stage and may cancel.
 ///
 /// # Errors
 /// There is too little flight or excitation, the id of an effect is unknown, the sampling interval of a flight is not
@@ -80,7 +82,7 @@ pub fn diagnose(
     Ok(diagnosis)
 }
 
-/// Diagnosis that does not use the constants of single flights in the model file.
+/// The diagnosis without the constants of installation and flights (sensor errors, trims) that the model file may contain.
 fn of_unknown(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -142,7 +144,7 @@ fn of_unknown(
     })
 }
 
-/// Measured and predicted forces and moments of `flights`.
+/// The forces and moments of `flights`, measured and predicted by `model`.
 fn loads(model: &GreyBox, flights: &[Prepared]) -> Vec<Vec<Series>> {
     let is_load = |s: &Series| ChannelId::ALL[..CHANNELS].contains(&s.channel);
     let of = |flight: &Prepared| -> Vec<Series> {
@@ -151,10 +153,11 @@ fn loads(model: &GreyBox, flights: &[Prepared]) -> Vec<Vec<Series>> {
     flights.iter().map(of).collect()
 }
 
-/// Returns a note on the windows of `series` in which `model` predicts no finite number; `None` if there are none.
+/// Returns a note on the windows (short stretches of flight) in which `model` predicts no finite number; `None` if there are
+/// none.
 ///
 /// # Errors
-/// The model predicts no finite number in any window of a measured channel. Such a channel would otherwise count as
+/// In all windows of a measured channel, the model predicts no finite number. Such a channel would otherwise count as
 /// explained.
 fn predicted(model: &GreyBox, series: &[Vec<Series>]) -> Result<Option<String>, DiagnoseError> {
     let lost = |channel: &ChannelId| {
@@ -182,14 +185,14 @@ fn settings(options: &Options) -> Settings {
 /// Results of the checks that follow the search.
 struct Judged {
     abstained: [Option<String>; 6],
-    /// Whether `compare` finds no certain error of the given model in any channel.
+    /// Whether `compare` finds no channel in which the given model certainly errs.
     faultless: bool,
     tuned: Vec<Tuned>,
     doubtful: Vec<String>,
 }
 
-/// Refuses effects in channels in which the flights cannot assess the model, and effects whose coefficients may be
-/// zero. Refuses all effects if an estimate is physically impossible.
+/// Refuses effects if the flights cannot assess the model in any of their channels, and effects whose coefficients may be zero.
+/// Refuses all effects if an estimate is physically impossible.
 fn judge(
     found: &mut Found,
     model: &GreyBox,
@@ -210,10 +213,9 @@ fn judge(
 
 /// Returns the verdict. If it is [`Verdict::Unknown`] although no estimate is impossible, also returns the reason.
 ///
-/// An impossible estimate overrides any verdict. Three further conditions turn only `Unexplained` into `Unknown`: no
-/// channel can be assessed, the given model has no certain error, or a flexible model of the states removes little of
-/// the residual. In the last case the residual is not a function of the states. Timing errors or filtered sensors leave
-/// such residuals.
+/// An impossible estimate turns any verdict into `Unknown`. The verdict `Unexplained` becomes `Unknown` in three more cases: no
+/// channel can be assessed, the given model has no certain error, or a flexible model of the states removes little of the
+/// residual. In the last case the residual is not a function of the states, as after timing errors or with filtered sensors.
 fn spoken(
     found: &Found,
     doubtful: &[String],
@@ -234,8 +236,8 @@ fn spoken(
     }
 }
 
-/// Returns the results of `compare`: for each channel, the reason why it cannot be assessed; and whether no channel has
-/// a certain error.
+/// Returns two results of `compare`: for each channel, the reason why the model cannot be assessed in it; and whether the model
+/// certainly errs in no channel.
 fn compared(
     model: &GreyBox,
     flights: &[&Reconstruction],
@@ -258,11 +260,11 @@ pub fn known(ids: &[String]) -> Result<(), DiagnoseError> {
     }
 }
 
-/// The problem, the flights that it contains, and notes for the reader.
+/// The problem of the search, the flights that it contains, and notes for the user.
 pub type Intake<'a> = (Problem, Vec<&'a Reconstruction>, Vec<String>);
 
-/// Resamples the flights to a multiple of the model step and sets up the problem with its priors. Flights that cannot
-/// be used are left out with a note.
+/// Resamples the flights to a multiple of the model's time step, and sets up the problem of the search with its priors. Flights
+/// that cannot be used are left out with a note.
 pub fn problem<'a>(
     model: &GreyBox,
     flights: &'a [Reconstruction],
@@ -297,7 +299,7 @@ pub fn problem<'a>(
     Ok((problem, used, notes))
 }
 
-/// Returns the verdict on the search's result: an effect, something unexplained, or an adequate model.
+/// Returns the verdict on the result of the search: an effect, something unexplained, or an adequate model.
 pub fn verdict(found: &Found) -> Verdict {
     let significant =
         found.remainder.total > found.remainder.total_threshold && found.learnable() > WORTH_SAYING;
@@ -313,7 +315,7 @@ pub fn verdict(found: &Found) -> Verdict {
     }
 }
 
-/// Ids of the candidate effects that a model lacks and that can be searched for.
+/// Ids of the effects for which a diagnosis of `model` searches. The effects `without` are left out.
 pub fn searched(model: &GreyBox, without: &[String]) -> Vec<&'static str> {
     catalogue::candidates(model, &[], without).iter().map(|e| e.about.id).collect()
 }

@@ -1,4 +1,6 @@
-//! The diagnosis in plain sentences.
+//! Words the result of a diagnosis in sentences. A diagnosis searches the catalogue for effects (groups of terms) that a model
+//! lacks. The evidence of an effect must exceed a threshold, which chance hardly reaches. The residual is measured minus
+//! modelled forces and moments.
 
 use crate::diagnose::answer::result::{
     Candidate, ChannelLeft, FlightTrim, Measurement, Parameter, Status, Verdict,
@@ -10,14 +12,15 @@ use crate::per_flight::askew;
 use greylag_model::GreyBox;
 use greylag_physics::catalogue::describe;
 
-/// Distance from the prior mean, in prior standard deviations, beyond which a re-estimated coefficient gets a note.
+/// A re-estimated coefficient gets a note if it differs from its value in the model file by more than this number of prior
+/// standard deviations.
 const FAR: f64 = 3.0;
-/// Smallest share that is reported. A smaller share would be printed as zero.
+/// Smallest removable share of the residual that is reported. A smaller share would be printed as zero.
 const SHOWN: f64 = 0.005;
 /// Half width of a 95 % interval in standard deviations.
 pub const INTERVAL: f64 = 1.96;
-/// A refused effect is named as the closest one if it removes more than this share of the residual from held-out
-/// blocks.
+/// An effect that is not asserted is named as the closest one if it removes more than this share of the residual in blocks
+/// of data that its fit did not use.
 const CLOSEST: f64 = 0.5;
 /// Advice for misaligned axes.
 const AXES: &str = "amend with --axes-askew 3, or mount the board anew";
@@ -28,7 +31,7 @@ pub struct Content<'a> {
     pub found: &'a Found,
     /// Overall verdict on the model.
     pub verdict: Verdict,
-    /// Reason for [`Verdict::Unknown`]; `None` for other verdicts, and if an impossible estimate is the reason.
+    /// Reason for [`Verdict::Unknown`]. `None` for other verdicts, and if a physically impossible estimate is the reason.
     pub why_unknown: Option<WhyUnknown>,
     /// Physically impossible estimates, in words.
     pub doubtful: &'a [String],
@@ -45,16 +48,16 @@ pub struct Content<'a> {
 /// Reason why a diagnosis has no verdict although no estimate is physically impossible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WhyUnknown {
-    /// The remaining errors of the sensors may account for the residual in every channel.
+    /// Remaining sensor errors may account for the whole residual in every channel (force or moment).
     SensorsMayAccount,
     /// The model as given has no certain error in any channel.
     GivenModelFaultless,
-    /// A flexible model of the states can remove only little of the residual.
+    /// A flexible model, a regression on the states without physics, can remove only little of the residual.
     NotOfTheStates,
 }
 
-/// Describes the results in sentences, the most important first: impossible estimates, misaligned axes, missing effects
-/// with the verdict, remaining residual, sensors.
+/// Describes the results in sentences. Their order is: impossible estimates, misaligned axes, missing effects and verdict,
+/// small effects, remaining residual, refused effects, channels without judgement, sensors, trims.
 pub fn sentences(content: &Content) -> Vec<String> {
     let Content { verdict, doubtful, effects, channels, measurement, .. } = *content;
     let mut all: Vec<String> = doubtful.to_vec();
@@ -109,7 +112,7 @@ fn answer(content: &Content) -> Option<String> {
     }
 }
 
-/// Sentence that states why no effect is asserted although the residual exceeds noise.
+/// Sentence for [`Verdict::Unknown`]: why no effect is asserted although the residual exceeds noise.
 fn undecided(content: &Content) -> String {
     match content.why_unknown {
         Some(WhyUnknown::GivenModelFaultless) => "The model as given has no sure error in any channel of these flights, \
@@ -128,8 +131,8 @@ fn undecided(content: &Content) -> String {
     }
 }
 
-/// Sentence that states that an effect is missing. It names the closest effect of the catalogue if this effect removes
-/// most of the residual.
+/// Sentence that states that something is missing that is not in the catalogue. It names the closest effect of the catalogue
+/// if that effect removes most of the residual.
 fn unexplained(found: &Found, effects: &[Candidate]) -> String {
     let close = |c: &&Candidate| c.status == Status::Refused && c.heldout_error_reduction > CLOSEST;
     match effects.iter().find(close) {
@@ -150,7 +153,7 @@ fn unexplained(found: &Found, effects: &[Candidate]) -> String {
     }
 }
 
-/// Sentences on the residual that remains with the effects found.
+/// Sentences on the residual that remains after the asserted effects are added.
 fn beyond(content: &Content) -> Vec<String> {
     let Content { found, verdict, channels, .. } = *content;
     let left = channels.iter().filter(|c| !c.abstained).filter_map(|c| {
@@ -204,12 +207,12 @@ fn sensors(measurement: &[Measurement]) -> Vec<String> {
     flights.into_iter().map(one).collect()
 }
 
-/// A value with the half width of its 95 % interval and its unit.
+/// A value with the half width of its 95 % interval and its unit, as text.
 pub fn with_interval(value: f64, sd: f64, unit: &str) -> String {
     format!("{} ± {} {unit}", figures(value), figures(INTERVAL * sd)).trim_end().to_owned()
 }
 
-/// The parameters with their 95 % intervals, in words.
+/// The coefficients of an effect with their 95 % intervals, as text.
 fn values(c: &Candidate) -> String {
     let of = |p: &Parameter| {
         let sd = (p.ci95[1] - p.ci95[0]) / (2.0 * INTERVAL);
@@ -257,8 +260,8 @@ fn asserted(c: &Candidate) -> String {
     text
 }
 
-/// Sentence that names `others`, effects that may also be the cause, and the manoeuvres `separate` that would decide.
-/// An effect file may state no manoeuvres. No manoeuvre decides between an effect and misaligned axes.
+/// Sentence that names `others`, effects that may be the cause instead, and the manoeuvres `separate` that would decide. An
+/// effect file may state no manoeuvres. No manoeuvre decides between an effect and misaligned axes.
 fn alike(others: &[String], separate: &str) -> String {
     let decides = match separate {
         _ if others.iter().all(|id| id == askew::ID) => format!("; to see, {AXES}"),
@@ -271,7 +274,7 @@ fn alike(others: &[String], separate: &str) -> String {
     )
 }
 
-/// Phrase that states how much of the residual a flexible model could remove; empty if this does not exceed chance.
+/// Phrase that states how much of the residual a flexible model could remove. It is empty if this does not exceed chance.
 fn removable(found: &Found) -> String {
     let more = found.remainder.total > found.remainder.total_threshold;
     match more && found.learnable() >= SHOWN {
@@ -302,8 +305,8 @@ pub fn figures(x: f64) -> String {
     format!("{x:.places$}")
 }
 
-/// Notes on coefficients and sensor errors far from their prior, on the flexible model, and on effects that were not
-/// candidates.
+/// Notes on coefficients and sensor errors far from their prior values, on what a flexible model could remove, on constants
+/// of single flights, and on effects that were left out of the search.
 pub fn notes(found: &Found, model: &GreyBox, options: &Options) -> Vec<String> {
     let mut notes = Vec::new();
     for t in shares::tuned(found, model) {

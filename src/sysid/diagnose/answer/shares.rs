@@ -1,4 +1,7 @@
-//! Unexplained residual of each channel, and the re-estimated coefficients.
+//! Two parts of a diagnosis: how much of each channel (component of force or moment) the model leaves unexplained, and the
+//! re-estimated coefficients.
+//!
+//! The residual of a channel is the difference between measurement and model. It is averaged over overlapping windows.
 
 use crate::compare::{ChannelId, RegimeVariable};
 use crate::diagnose::answer::result::{ChannelLeft, Tuned};
@@ -14,8 +17,8 @@ const BINS: usize = 5;
 const WORTH: f64 = 4.0;
 const SYMBOLS: [&str; 6] = ["D", "L", "Y", "l", "m", "n"];
 
-/// Unexplained residual of every channel that the flights measure. `abstained` holds the reason for each channel in
-/// which the flights cannot assess the model.
+/// Unexplained variance of every channel that the flights measure. For each channel in which the flights cannot assess the
+/// model, `abstained` holds the reason.
 pub fn channels(found: &Found, abstained: &[Option<String>; 6]) -> Vec<ChannelLeft> {
     let (before, after) = (found.unexplained, found.left());
     let residual = found.round().tuned_residual();
@@ -31,7 +34,7 @@ pub fn channels(found: &Found, abstained: &[Option<String>; 6]) -> Vec<ChannelLe
     (0..SYMBOLS.len()).filter(|k| before[*k].is_finite()).map(of).collect()
 }
 
-/// The flight condition (regime) in which a channel's mean residual is most significant, in words; `None` if no mean
+/// Text about the flight condition (regime) in which a channel's mean residual is most significant. `None` if no mean
 /// residual is significant.
 fn worst(round: &Round, residual: &[Column], channel: usize) -> Option<String> {
     let mut points = Vec::new();
@@ -83,7 +86,7 @@ fn worst_of(mut points: Vec<Point>, channel: usize) -> Option<String> {
     best.map(|(_, words)| words)
 }
 
-/// The coefficients of `model` as re-estimated in the last round.
+/// The coefficients of `model`, as given and as re-estimated in the last round of the search.
 pub fn tuned(found: &Found, model: &GreyBox) -> Vec<Tuned> {
     let round = found.round();
     let p = &round.projected;

@@ -1,4 +1,5 @@
-//! Free forms: a search over the expressions of a grammar if the shapes of the library leave a residual.
+//! Search for free forms, which are expressions of a grammar. It is made if a formula of the library's fixed shapes leaves a
+//! residual that a flexible model (a regression without physics) could remove.
 
 use super::forward::{Ask, Climbed, ORDER, candidates};
 use super::free::search::{Fitted, Searched, searched};
@@ -15,9 +16,8 @@ use greylag_physics::Channel;
 /// Free forms are tried if a flexible model could still remove more than this share of the residual that the library's
 /// formula removes.
 const MATERIAL: f64 = 0.02;
-/// The chosen form is the simplest one whose reduction of the residual is at most this share below the largest
-/// reduction. Even an exact formula of a strong effect leaves a residual of this order, due to errors of the
-/// reconstructed path.
+/// The simplest form is chosen whose reduction of the residual is less than the largest reduction by at most this share.
+/// Even an exact formula of a strong effect leaves a residual of this order, due to errors of the reconstructed path.
 const BEHIND: f64 = 0.01;
 /// Smallest additional reduction of the whitened residual sum of squares that justifies a larger formula.
 const WORTH: f64 = 10.0;

@@ -1,13 +1,13 @@
-//! Text of a proposed formula, and its effect file.
+//! Writes a proposed formula as a line of text and as an effect file, which defines an effect of a model by a formula.
 
 use super::grades;
 use super::library::{Form, Shape};
 use greylag_physics::formula::file::channel_name;
 
-/// A term of a formula with its coefficient.
+/// A term of a proposed formula with its estimated coefficient.
 #[derive(Clone, Copy, Debug)]
 pub struct Term {
-    /// Form of the term.
+    /// Form of the term: a function of the states and controls, without the coefficient.
     pub form: Form,
     /// Estimated coefficient, in the form's unit.
     pub value: f64,
@@ -15,8 +15,8 @@ pub struct Term {
     pub sd: f64,
 }
 
-/// Drops the last term of `terms` unless it was `added`: the list is cut to its former length `count`. `added` is
-/// `None` if the model with the term cannot be evaluated. Returns whether the term was added.
+/// Keeps the new terms at the end of `terms` if `added` is `Some(true)`. Otherwise cuts the list to its former length `count`.
+/// `added` is `None` if the model with the new term cannot be evaluated. Returns whether the new terms were kept.
 pub fn kept(terms: &mut Vec<Term>, count: usize, added: Option<bool>) -> bool {
     let added = added == Some(true);
     if !added {
@@ -25,8 +25,7 @@ pub fn kept(terms: &mut Vec<Term>, count: usize, added: Option<bool>) -> bool {
     added
 }
 
-/// A coefficient's bounds in the effect file are ± this factor times the sum of its magnitude and three standard
-/// deviations.
+/// The bounds of a coefficient in the effect file are ± this factor times (its magnitude plus three standard deviations).
 const ROOM: f64 = 10.0;
 
 /// Rounds `x` to four significant figures.
@@ -34,7 +33,8 @@ fn rounded(x: f64) -> f64 {
     format!("{x:.3e}").parse().unwrap_or(x)
 }
 
-/// Identifier of the proposed effect, at most 40 characters: channel and variables of its terms.
+/// Identifier of the proposed effect, at most 40 characters. It has the channel (force or moment) of the first term, and the
+/// variables of all terms.
 pub fn id(terms: &[Term]) -> String {
     let channel = terms.first().map_or("", |t| channel_name(t.form.channel));
     let mut names: Vec<&str> = Vec::new();
@@ -56,15 +56,15 @@ pub fn formula(terms: &[Term]) -> String {
     terms.iter().map(one).collect::<Vec<_>>().join("; ")
 }
 
-/// Names that the constants of the term with the index `k` have in the effect file.
+/// Names in the effect file of the constants in the form of `term`, which has the index `k`.
 fn names(k: usize, term: &Term) -> Vec<String> {
     let count = term.form.shape.constants().len();
     let letter = |i: usize| if count > 1 { ["a", "b", "c", "d"][i.min(3)] } else { "" };
     (0..count).map(|i| format!("w{}{}", k + 1, letter(i))).collect()
 }
 
-/// Text of the effect file for `terms`, in which thresholds and other constants are parameters. `alike` lists formulas
-/// that the flights cannot distinguish from the proposed one. `from` names the flights of the search.
+/// Text of the effect file for `terms`. Coefficients, thresholds and other constants are parameters in it. `alike` lists the
+/// formulas that the flights cannot distinguish from this one. `from` names the flights of the search.
 pub fn file(terms: &[Term], description: &str, alike: &[String], from: &str) -> String {
     let quoted = |text: &str| toml::Value::from(text).to_string();
     let mut text = format!(

@@ -1,4 +1,5 @@
-//! Forward selection of terms: adds the best form as long as it is significant and reduces the residual enough.
+//! Forward selection of the terms of a formula for a missing effect. A form is a function of some variables. A term is a form
+//! times a coefficient. A round is the model linearised over the flights, with the forms as candidates of a regression.
 
 use super::draft::{self, Term};
 use super::grades;
@@ -19,11 +20,11 @@ use greylag_physics::formula::Variable;
 
 /// Largest number of terms of a formula.
 const MOST: usize = 3;
-/// A further term must reduce the residual by at least this share of the first term's reduction.
+/// A further term must reduce the residual sum of squares by more than this share of the first term's reduction.
 const WORTH: f64 = 0.05;
 /// Number of passes in which all coefficients are re-estimated after a term has been added.
 const SETTLING: usize = 2;
-/// A channel is searched if at least this share of its variance beyond noise is unexplained.
+/// A channel (force or moment) is searched if the model leaves at least this share of its variance unexplained.
 const FAILING: f64 = 5e-4;
 /// The unexplained share must also be at least this fraction of the worst channel's share.
 const BESIDE: f64 = 0.05;
@@ -35,7 +36,7 @@ const CHANNELS: usize = 3;
 pub(super) const ORDER: [Channel; 6] =
     [Channel::Drag, Channel::Lift, Channel::Side, Channel::Roll, Channel::Pitch, Channel::Yaw];
 
-/// The channels that the diagnosis leaves unexplained, by descending ratio of removable residual to critical value.
+/// The channels that the diagnosis leaves unexplained, in descending order of removable residual over its critical value.
 pub(super) fn failing(found: &Found) -> Vec<Channel> {
     let tuned = &found.unexplained;
     let removable = |c: usize| {
@@ -50,13 +51,13 @@ pub(super) fn failing(found: &Found) -> Vec<Channel> {
     all.into_iter().map(|c| ORDER[c]).collect()
 }
 
-/// The forms of the library in `channels`, with their entries as candidates of the regression.
+/// The forms of the library for `channels`, each with its entry as a candidate of the regression.
 pub(super) fn forms(problem: &Problem, channels: &[Channel]) -> Vec<(Form, Entry)> {
     let threshold = |v: Variable, q: f64| rounded(magnitude(problem, v, q));
     candidates(channels.iter().flat_map(|c| library::forms(*c, &threshold)))
 }
 
-/// Adds the entries for the regression to `forms`. Invalid forms are left out.
+/// The forms, each with its entry as a candidate of the regression. Invalid forms are left out.
 pub(super) fn candidates(forms: impl Iterator<Item = Form>) -> Vec<(Form, Entry)> {
     let entry = |form: Form| {
         let effect = form.effect().ok()?;
@@ -70,7 +71,7 @@ fn rounded(x: f64) -> f64 {
     format!("{x:.1e}").parse().unwrap_or(x)
 }
 
-/// Quantile `share` of the magnitude of a variable over the flights.
+/// The quantile `share` of the magnitude of a variable over the flights.
 fn magnitude(problem: &Problem, variable: Variable, share: f64) -> f64 {
     let mut values: Vec<f64> = Vec::new();
     for instant in problem.flights.iter().flat_map(|f| f.segments.iter().flatten()) {
@@ -95,15 +96,15 @@ pub(super) struct Ask<'a> {
     pub problem: &'a Problem,
     pub options: &'a Options,
     pub forms: &'a [(Form, Entry)],
-    /// Channels whose residual is included, in the order of the regression.
+    /// Whether the residual of each channel is included, in the order of [`ORDER`].
     pub channels: [bool; 6],
     /// Smallest evidence of the first term: the critical value of the search that selected the forms, else 0.
     pub least: f64,
-    /// Largest loss of error reduction, as a share, for which a simpler form is preferred to the best form.
+    /// A simpler form is preferred if its reduction of the residual is smaller by at most this share of the best one.
     pub behind: f64,
 }
 
-/// Record of a search: formulas, alternatives, certain properties, objections, evidence in bootstrap draws.
+/// Record of a search: formulas, alternatives, certain properties, objections, best evidence in each draw of noise.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Outcome {
     pub front: Vec<Rung>,
@@ -124,7 +125,7 @@ pub(super) struct Climbed {
     pub class: Vec<Form>,
     /// The model with the terms added.
     pub model: GreyBox,
-    /// Residual beyond noise of the model as given: whitened residual sum of squares minus that of pure noise.
+    /// Residual beyond noise of the model without terms: whitened residual sum of squares minus that of pure noise.
     pub excess: f64,
     /// The first round; `None` if there was nothing to try.
     pub round: Option<Round>,
@@ -135,12 +136,12 @@ pub(super) struct Climbed {
 }
 
 impl Climbed {
-    /// Share of the residual beyond noise that the terms remove.
+    /// Share of the residual beyond noise that the chosen formula removes.
     pub(super) fn removed(&self) -> f64 {
         self.outcome.front.iter().find(|r| r.chosen).map_or(0.0, |r| r.removed)
     }
 
-    /// Number of nodes of the formula.
+    /// Number of nodes (variables, numbers and operations) of the formula.
     pub(super) fn complexity(&self) -> usize {
         self.terms.iter().map(|t| 1 + t.form.shape.complexity()).sum()
     }
@@ -222,7 +223,6 @@ impl Ask<'_> {
             threshold,
             chosen: false,
         });
-        // reset below if the term is added
         let much = score.fall > WORTH * c.excess;
         c.significant_left_out = !first && score.evidence > threshold && much;
         if score.evidence <= threshold || !worth {
@@ -251,7 +251,7 @@ impl Ask<'_> {
         Some(true)
     }
 
-    /// Determines which properties of the first term are certain.
+    /// Determines which properties of the first term are certain, and which other forms cannot be distinguished from it.
     fn grade(&self, c: &mut Climbed, stage: &Stage, form: &Form) {
         let &Stage { round, scores, place, .. } = stage;
         let (trial, score) = &scores[place];
@@ -269,7 +269,7 @@ impl Ask<'_> {
         c.outcome.alike = alike.iter().map(alternative).collect();
     }
 
-    /// Residual beyond noise of `model`; `None` if the model cannot be evaluated.
+    /// Residual beyond noise of `model`; `None` if the model cannot be evaluated over the flights.
     fn excess(&self, model: &GreyBox) -> Option<f64> {
         Some(checks::excess(&Round::new(self.problem, model.clone(), &[])?, &self.channels))
     }
@@ -298,7 +298,7 @@ impl Ask<'_> {
         }
     }
 
-    /// Index in `scores` of the simplest form that is as good as the best form.
+    /// Index in `scores` of the simplest form that is about as good as the best form.
     fn winner(&self, round: &Round, scores: &[(usize, Score)]) -> Option<usize> {
         let fits = |k: &usize| {
             let (trial, score) = &scores[*k];
@@ -341,7 +341,7 @@ impl Ask<'_> {
             .collect()
     }
 
-    /// Whether a larger, correlated form removes much more of the residual; the chosen form is then an approximation.
+    /// Whether a correlated form removes much more of the residual. The form at `place` is then an approximation of it.
     fn surpassed(&self, stage: &Stage) -> bool {
         let &Stage { round, scores, place, .. } = stage;
         let size = |k: usize| {
@@ -392,9 +392,9 @@ fn moved(term: &Term, model: &GreyBox) -> bool {
     })
 }
 
-/// The reduction of the residual sum of squares by a simpler form may be this much lower: a likelihood ratio of e⁻².
+/// A simpler form may reduce the residual sum of squares by this much less, which is a likelihood ratio of e⁻².
 const LIKELY: f64 = 4.0;
-/// Additional allowance for each node by which the form is smaller. Each node allows about e times as many forms.
+/// Additional allowance for each node by which the form is smaller. With each node there are about e times as many forms.
 const NODE: f64 = 2.0;
 /// Two contributions are the same form, written in different ways, if their correlation differs from ±1 by less than this.
 const SAME: f64 = 1e-9;

@@ -1,4 +1,6 @@
-//! Properties of a form that the flights determine, and the description of a form in words.
+//! Which properties of a form the flights determine, and the description of a form in words.
+//!
+//! A form is a formula that may describe an unknown effect: a channel (force or moment) as a function of one or more variables.
 
 use super::free::{self, trend::plain};
 use super::library::{Form, Shape};
@@ -6,9 +8,9 @@ use super::result::Grades;
 use greylag_physics::Channel;
 use greylag_physics::formula::Variable;
 
-/// Trend of a form in each of its variables (parity and monotonicity), in words.
+/// Trend of a form in each of its variables (even or odd, rising or falling), in words.
 fn trend(form: &Form) -> Option<String> {
-    // in the steady state, a lagged control equals the control
+    // in the steady state, a lagged control equals the control itself
     let shape = match form.shape {
         Shape::Lagged(v, _) => Shape::Linear(v),
         shape => shape,
@@ -16,8 +18,8 @@ fn trend(form: &Form) -> Option<String> {
     free::trend::trend(&shape.text(None))
 }
 
-/// Determines which properties of `best` are certain: those that all forms of `alike` share. The flights cannot
-/// distinguish these forms from `best`.
+/// Determines which properties of `best` are certain: those that all forms of `alike` have too. `alike` are the forms that the
+/// flights cannot distinguish from `best`.
 pub fn grades(best: &Form, alike: &[Form]) -> Grades {
     let same = |of: &dyn Fn(&Form) -> bool| alike.iter().all(of);
     let variables = sorted(best);
@@ -60,8 +62,8 @@ fn long(v: Variable) -> &'static str {
     }
 }
 
-/// Describes in words how the form's channel depends on its variables. `value` is the coefficient, whose sign decides
-/// between growth and decrease.
+/// Describes in words how the form's channel depends on its variables. The sign of the coefficient `value` decides between
+/// growth and decrease.
 pub fn words(form: &Form, value: f64) -> String {
     let runs = if value < 0.0 { "falls" } else { "grows" };
     let how = match form.shape {

@@ -1,4 +1,4 @@
-//! Test of a formula on held-out flights: share of the residual that it removes, compared with chance.
+//! Test of a proposed formula on held-out flights: how much of the residual it removes, compared with chance.
 
 use super::draft::Term;
 use super::forward::ORDER;
@@ -13,10 +13,11 @@ use crate::diagnose::search::stepwise::HELD_OUT;
 use greylag_model::GreyBox;
 use greylag_physics::formula::Written;
 
-/// Share of the residual beyond noise of the model `before`, in `channels`, that the model `after` removes. `None` if a
-/// model cannot be evaluated over the flights.
+/// Fraction of the residual beyond noise that is removed in `channels` if the model `after` replaces the model `before`. The
+/// residual beyond noise is the whitened sum of squares minus its expectation for pure noise. `None` if a model cannot be
+/// evaluated over the flights.
 ///
-/// Both residuals use the noise of `after`. Otherwise a better model would be penalised for its smaller noise.
+/// Both residuals are whitened with the noise of `after`. Otherwise a better model would be penalised for its smaller noise.
 pub(super) fn removed(
     problem: &Problem,
     before: &GreyBox,
@@ -30,8 +31,8 @@ pub(super) fn removed(
     Some(1.0 - left / all.max(1.0))
 }
 
-/// Tests how far `terms` with fixed coefficients reduce the residual of `model` on held-out flights. `flights` holds
-/// their names. `None` if the model cannot be evaluated over the flights.
+/// Tests how much the formula `terms`, with fixed coefficients, reduces the residual of `model` on the held-out flights of
+/// `problem`. `flights` are the names of these flights. `None` if the model cannot be evaluated over them.
 pub(super) fn tested(
     problem: &Problem,
     model: &GreyBox,
@@ -65,12 +66,13 @@ pub(super) fn tested(
         with.join_most(effect.about.id, &values).ok()?;
     }
     let removed = removed(problem, model, &with, &channels)?;
-    // at least zero: a negative reduction is not an improvement
+    // the threshold is at least zero, because a negative reduction is not an improvement
     let threshold = chance.last().copied().unwrap_or(f64::INFINITY).max(0.0);
     Some(HeldOut { flights, removed, fall: measured, threshold })
 }
 
-/// Objection to the formula from the held-out flights; `None` if there is none.
+/// Objection to the formula: on the held-out flights it reduces the residual no more than chance does, or by too small a
+/// fraction. `None` if there is no objection.
 pub(super) fn objection(tested: &HeldOut) -> Option<String> {
     if tested.fall <= tested.threshold {
         return Some(format!(

@@ -1,7 +1,8 @@
-//! Candidates with controls through a first-order lag, in addition to the library's formula.
+//! Search for a formula of a missing effect in which controls pass through a first-order lag.
 //!
-//! The shapes of the library depend only on present values. A moment that follows an engine or a flap with a delay is
-//! therefore fitted with the present control. The residual then follows the rate of the control, which no shape contains.
+//! A form is a function of some variables; a formula is a sum of forms with coefficients. The forms of the library depend only on
+//! present values. If a moment follows an engine or a flap with a lag, the library's formula contains the present control. It
+//! then leaves a residual that is proportional to the rate of the control, which no form of the library contains.
 
 use super::forward::{Ask, Climbed, candidates};
 use super::library::{self, CONTROLS, Form};
@@ -9,8 +10,8 @@ use greylag_model::GreyBox;
 use greylag_physics::Channel;
 use greylag_physics::formula::Variable;
 
-/// The lagged forms that are tried: lags of the controls in the library's formula, and lags of all controls in the
-/// channels `doubted`, in which the formula leaves a residual.
+/// The lagged forms that are tried: lags of the controls in the library's formula `library`, and lags of all controls in the
+/// channels `doubted` (forces or moments in which this formula leaves a residual).
 pub(super) fn forms(library: &Climbed, doubted: &[Channel]) -> Vec<Form> {
     let mut all: Vec<Form> = Vec::new();
     for term in &library.terms {
@@ -27,8 +28,8 @@ pub(super) fn forms(library: &Climbed, doubted: &[Channel]) -> Vec<Form> {
     kept
 }
 
-/// Repeats the search with the forms `lags`, the library's terms, and the forms that are indistinguishable from the
-/// first term. `None` if the model cannot be evaluated over the flights.
+/// Repeats the search with three kinds of forms: `lags`, those of the library's formula, and those that the flights cannot
+/// distinguish from the formula's first term. `None` if the model cannot be evaluated over the flights.
 pub(super) fn climb(
     ask: &Ask,
     library: &Climbed,

@@ -1,5 +1,5 @@
 //! Library of shapes: functions of one or two variables. A form is a shape times a known factor that depends on the
-//! channel.
+//! channel, which is a force or a moment.
 
 use super::free::Free;
 use greylag_physics::Channel;
@@ -200,7 +200,7 @@ impl Form {
     pub fn fitted(self, values: &[f64]) -> Form {
         match (self.shape, values) {
             (Shape::Lagged(v, _), [_, tau, ..]) => {
-                // three figures, for a readable text
+                // three digits, for a readable text
                 let tau = format!("{tau:.2e}").parse().unwrap_or(*tau);
                 Form { shape: Shape::Lagged(v, tau), ..self }
             }

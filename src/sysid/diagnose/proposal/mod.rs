@@ -1,4 +1,5 @@
-//! Proposal of a formula for an effect outside the catalogue: search, test on held-out flights, description in words.
+//! Proposes a formula for an effect that a model lacks and that no entry of the catalogue describes. The formula is searched for,
+//! tested on held-out flights and described in words.
 
 mod beyond;
 mod draft;

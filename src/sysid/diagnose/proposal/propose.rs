@@ -1,5 +1,6 @@
-//! Search for a formula, term by term, on some flights, and test of the whole formula on other flights. The terms come
-//! from a library of shapes or are expressions of a grammar (free forms).
+//! Proposes a formula for an effect that a model lacks and that the catalogue does not contain. The formula is found term by
+//! term on some flights and tested on other flights. The terms come from a library of shapes or are expressions of a
+//! grammar (free forms).
 
 use super::beyond::{better, beyond, doubt};
 use super::draft::{self, Term};
@@ -22,19 +23,19 @@ use crate::rudder;
 use greylag_model::{GreyBox, RUDDER};
 use greylag_physics::Channel;
 
-/// Estimated share of the work that is done after the diagnosis. The next constants are the shares before the lags,
-/// before and after the free forms, and before the test.
+/// Estimated share of the whole work that is done after the diagnosis (`SEARCHED`), before lagged controls are tried (`LAGS`),
+/// before and after free forms are tried (`FREE`), and before the test (`TESTED`).
 const SEARCHED: f64 = 0.3;
 const LAGS: f64 = 0.5;
 const FREE: [f64; 2] = [0.6, 0.9];
 const TESTED: f64 = 0.9;
 
-/// Proposes a formula for the effect that `model` lacks according to `flights`, if a diagnosis leaves it unexplained,
-/// and tests it on `held_out`. Constants of single flights in the model's file are not used. `progress` receives the
-/// stages and may cancel.
+/// Diagnoses `model` on `flights`. If the diagnosis finds that something is missing that the catalogue cannot explain, a
+/// formula is searched for on `flights` and tested on `held_out`. Constants of single flights in the model's file are not
+/// used. `progress` receives the stages and may cancel.
 ///
 /// # Errors
-/// As [`diagnose`](crate::diagnose::diagnose).
+/// The same as [`diagnose`](crate::diagnose::diagnose).
 pub fn propose(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -85,7 +86,7 @@ pub fn propose(
         proposal.sentences.push(nothing(&proposal));
         return Ok(proposal);
     };
-    // further terms show that the form of the first term is incomplete
+    // if the formula has further terms, the form of the first term is incomplete
     let whole = terms.len() == 1 && !outdone(&proposal);
     proposal.grades.iter_mut().for_each(|grades| grades.form &= whole);
     report(progress, "testing the formula on flights that the search has not seen", TESTED)?;
@@ -96,8 +97,8 @@ pub fn propose(
     Ok(proposal)
 }
 
-/// Channels in which a formula is searched for. `rudder` states whether a rudder that is not in the model moves. The
-/// channels on which a rudder acts are then left out.
+/// Channels (forces and moments) in which a formula is searched for. If `rudder` is true, a rudder moves that the model does
+/// not have. The channels on which a rudder acts are then left out.
 fn searched(found: &Found, rudder: bool) -> Vec<Channel> {
     let moved = [Channel::Drag, Channel::Side, Channel::Roll, Channel::Yaw];
     let mut channels = failing(found);
@@ -106,8 +107,8 @@ fn searched(found: &Found, rudder: bool) -> Vec<Channel> {
 }
 
 /// Whether a free form that was not chosen has more evidence than the chosen formula of the library. The form of the
-/// chosen formula is then not certain. The two values of evidence are not strictly comparable, because they come from
-/// different estimates of the model. They therefore affect only the statement that the form is certain.
+/// chosen formula is then not certain. The two values of evidence come from different estimates of the model and are not
+/// strictly comparable. They therefore decide only on whether the form is called certain.
 fn outdone(proposal: &Proposal) -> bool {
     let best = |rungs: &[Rung]| rungs.iter().map(|r| r.evidence).fold(0.0, f64::max);
     let free = proposal.free.as_ref().filter(|free| !free.chosen);
@@ -147,8 +148,8 @@ fn empty(
     }
 }
 
-/// Adds the sentences to the proposal, and the effect file if there is no objection. `from` names the flights of the
-/// search.
+/// Adds the result of the test, the sentences and, if there is no objection, the text of the effect file to `proposal`.
+/// `from` names the flights of the search.
 fn conclude(proposal: &mut Proposal, first: &Term, terms: &[Term], tested: HeldOut, from: &str) {
     proposal.refused.extend(objection(&tested));
     proposal.sentences.extend(sentences(proposal, first, terms, &tested));
@@ -160,7 +161,7 @@ fn conclude(proposal: &mut Proposal, first: &Term, terms: &[Term], tested: HeldO
     proposal.held_out = Some(tested);
 }
 
-/// Returns the library's formula, or a better formula with lagged controls or free forms. Records the free forms in
+/// Returns the formula `library`, or a better formula with lagged controls or free forms. Records the free forms in
 /// `proposal`.
 fn beyond_library(
     ask: &Ask,

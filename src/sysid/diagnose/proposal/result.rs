@@ -1,4 +1,8 @@
 //! The result of a search for a formula, serialized to JSON (`greylag.proposal/1`).
+//!
+//! The formula describes an effect that the model lacks. It is a sum of terms, each of which acts in one channel (component of
+//! force or moment). The terms are chosen from the forms of a library, or from free forms, which are arbitrary expressions.
+//! The evidence of a term is the smaller of its penalised likelihood gain and its Wald statistic.
 
 use serde::Serialize;
 
@@ -17,7 +21,7 @@ pub struct Grades {
     pub form: bool,
 }
 
-/// A form that the flights cannot distinguish from the first term.
+/// A form that the flights cannot distinguish from the first term of the formula.
 #[derive(Clone, Debug, Serialize)]
 pub struct Alternative {
     /// The formula, as text.
@@ -26,14 +30,15 @@ pub struct Alternative {
     pub evidence: f64,
 }
 
-/// A formula of the search. It has one term more than the previous formula, or it is the best free form of its size.
+/// A formula that the search has tried. It has one term more than the previous formula, or it is the best free form of its
+/// size.
 #[derive(Clone, Debug, Serialize)]
 pub struct Rung {
     /// The formula, as text.
     pub formula: String,
-    /// Size of the formula: number of its variables, numbers and operations, with its coefficients.
+    /// Size of the formula: number of its variables, numbers, coefficients and operations.
     pub complexity: usize,
-    /// Share of the residual variance beyond noise in the searched channels that the formula removes.
+    /// Fraction of the residual variance beyond noise, in the searched channels, that the formula removes.
     pub removed: f64,
     /// Evidence of the last term of the formula.
     pub evidence: f64,
@@ -43,28 +48,28 @@ pub struct Rung {
     pub chosen: bool,
 }
 
-/// Test of the chosen formula on held-out flights, with its coefficients as found.
+/// Test of the chosen formula on held-out flights, which the search did not use. Its coefficients are not estimated again.
 #[derive(Clone, Debug, Serialize)]
 pub struct HeldOut {
     /// Names of the flights.
     pub flights: Vec<String>,
-    /// Share of the residual variance beyond noise, in the formula's channels, that the formula removes.
+    /// Fraction of the residual variance beyond noise, in the formula's channels, that the formula removes.
     pub removed: f64,
     /// Reduction of the residual sum of squares, in units of the noise's variance.
     pub fall: f64,
-    /// Largest reduction in bootstrap draws under the null hypothesis that no effect is missing; at least 0.
+    /// Largest value of `fall` in bootstrap draws under the null hypothesis that no effect is missing; at least 0.
     pub threshold: f64,
 }
 
-/// Result of the search over free forms. It is made if the library's shapes do not suffice.
+/// Result of the search over free forms. This search is made if the forms of the library do not suffice.
 #[derive(Clone, Debug, Serialize)]
 pub struct FreeForms {
     /// Reason for the search.
     pub why: String,
     /// Number of forms evaluated, over all channels.
     pub tried: usize,
-    /// The best form of each size, by channel, with fitted constants. A form is listed only if it removes more than all
-    /// smaller forms.
+    /// The best form of each size, by channel, with fitted constants. A form is listed only if it removes more of the residual
+    /// than all smaller forms.
     pub front: Vec<Rung>,
     /// Whether one of these forms is part of the chosen formula.
     pub chosen: bool,
@@ -77,7 +82,7 @@ pub struct Settings {
     pub seed: u64,
     /// Number of bootstrap draws under the null hypothesis, which determine the critical values.
     pub nulls: usize,
-    /// Ids excluded from the catalogue.
+    /// Ids of the effects that were excluded from the catalogue.
     pub without: Vec<String>,
     /// Whether free forms may be tried.
     pub free_forms: bool,
@@ -90,7 +95,7 @@ pub struct Proposal {
     pub schema: &'static str,
     /// Version of the program.
     pub version: &'static str,
-    /// Name of the model.
+    /// Name of the model that lacks the effect.
     pub model: String,
     /// Verdict of the preceding diagnosis.
     pub verdict: Verdict,
@@ -106,7 +111,7 @@ pub struct Proposal {
     pub grades: Option<Grades>,
     /// Test on held-out flights; `None` if there is no formula to test.
     pub held_out: Option<HeldOut>,
-    /// Number of shapes of the library that were evaluated, with lagged controls.
+    /// Number of forms of the library that were evaluated, including those with lagged controls.
     pub tried: usize,
     /// Reasons not to propose the formula; empty if it is proposed.
     pub refused: Vec<String>,

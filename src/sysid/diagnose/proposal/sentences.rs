@@ -1,4 +1,7 @@
-//! Wording of a proposal: formula, certain properties, free forms, test on held-out flights.
+//! Wording of a proposal, which is a formula for an effect outside the catalogue.
+//!
+//! The sentences are on the formula, its certain properties, the free forms and the test on held-out flights. A free form is a
+//! formula that is composed from functions instead of taken from the library of formulas.
 
 use super::draft::Term;
 use super::free::grammar::MOST_NODES;
@@ -14,7 +17,7 @@ pub(super) fn capital(text: &str) -> String {
     letters.next().map_or(String::new(), |c| c.to_uppercase().chain(letters).collect()) + "."
 }
 
-/// Describes the proposal in sentences: terms, certain properties, free forms, test.
+/// Describes the proposal in sentences: its terms, their certain properties, the free forms, the test.
 pub(super) fn sentences(
     proposal: &Proposal,
     first: &Term,

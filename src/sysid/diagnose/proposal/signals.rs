@@ -1,4 +1,4 @@
-//! Export of the residual that a search for a formula uses, as a CSV table.
+//! Export of the residual in which `propose` searches for a formula, as a CSV table.
 
 use std::fmt::Write;
 
@@ -11,12 +11,13 @@ use crate::flight_path::reconstruction::Reconstruction;
 use greylag_model::GreyBox;
 use greylag_physics::formula::file::channel_name;
 
-/// Returns the residual of `model` as a CSV table, after the model and the sensor errors have been fitted to `flights`.
+/// Returns the residual of `model` as a CSV table. Before that, the coefficients of `model` and the sensor errors are fitted to
+/// `flights`.
 ///
-/// Each window of the weak form (0.37 s, half overlapping) has one row. The columns are the index in `flights` from 0,
-/// the mean of each variable over the window (SI units), dynamic pressure times wing area (`qbar_S`, N), and the
-/// residual of each channel (N or N m; empty if it is not measured). The name of a residual's column is `left_`
-/// followed by the channel.
+/// The table has one row for each window of the weak form (0.37 s, half overlapping). Its columns are: the index of the flight
+/// in `flights`, from 0; the mean of each variable over the window (SI units); dynamic pressure times wing area (`qbar_S`, N);
+/// and the residual of each channel (N or N m; empty if it is not measured). The name of a residual's column is `left_` followed
+/// by the channel.
 ///
 /// # Errors
 /// As [`diagnose`](crate::diagnose::diagnose).
@@ -54,7 +55,7 @@ pub fn signals(
     Ok(text)
 }
 
-/// Index in `all` of each flight of `used`, which leaves out the flights that are too short.
+/// Index in `all` of each flight of `used`. Flights that are too short are missing in `used`.
 fn numbers(used: &[&Reconstruction], all: &[Reconstruction]) -> Vec<usize> {
     let number = |flight: &&Reconstruction| all.iter().position(|f| std::ptr::eq(f, *flight));
     used.iter().filter_map(number).collect()

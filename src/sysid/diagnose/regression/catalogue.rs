@@ -1,5 +1,6 @@
-//! Candidates of a diagnosis: effects that a model lacks, with their regressors. A shape constant is a coefficient in
-//! which an effect is nonlinear.
+//! Candidates of a diagnosis, which are effects that the model may lack, and their regressors (columns). A column has one row for
+//! each window, a short stretch of flight over which forces and moments are averaged. A shape constant is a coefficient in which
+//! an effect is nonlinear. A candidate with shape constants is linearised at several points: sets of values of its coefficients.
 
 use rayon::prelude::*;
 
@@ -14,32 +15,33 @@ use greylag_physics::formula::register;
 use greylag_physics::inputs;
 use greylag_physics::size::Size;
 
-/// Finite-difference step of a shape constant, as a share of its value.
+/// Finite-difference step of a coefficient of a nonlinear candidate, as a fraction of its value.
 const MOVED: f64 = 0.02;
-/// Largest change of a shape constant from its point of linearisation, as a share of its value.
+/// Largest change of such a coefficient from its value at the point of linearisation, as a fraction of this value.
 pub const REACH: f64 = 0.35;
 
-/// Factor between successive points of linearisation that are weaker than an input effect's first starting value.
+/// Factor between the first starting value of an input effect and the next weaker point of linearisation, and from this to the
+/// weakest.
 const SMALLER: f64 = 2.5;
 
-/// A candidate effect, which the model may lack.
+/// A candidate effect.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
     /// Description of the effect.
     pub about: Description,
-    /// Whether the effect acts on the deflections (input effect), as an actuator lag does.
+    /// Whether the effect changes the deflections (input effect), as an actuator lag does.
     pub operator: bool,
 }
 
 impl Entry {
-    /// Whether the effect comes from an effect file. The coefficients of such an effect have no prior.
+    /// Whether the effect comes from an effect file. Its linear coefficients may then take any value within their bounds.
     fn written(&self) -> bool {
         Kind::from_id(self.about.id).is_some_and(|kind| kind.written().is_some())
     }
 }
 
-/// Candidate effects for `model`: effects of the catalogue, and the effects `with` from effect files. The effects
-/// `without`, effects that `model` already has, and effects that cannot be searched for are left out.
+/// The candidates for `model`: effects of the catalogue, and the effects `with` from effect files. Left out are the effects
+/// `without`, effects that `model` already has, and effects that cannot be searched for.
 pub fn candidates(model: &GreyBox, with: &[String], without: &[String]) -> Vec<Entry> {
     let of = |about: Description, operator| Entry { about, operator };
     let physical = on_air().map(|about| of(about, false));
@@ -64,14 +66,14 @@ pub fn candidates(model: &GreyBox, with: &[String], without: &[String]) -> Vec<E
 
 /// Regressors of the candidates for all flights.
 pub struct Columns {
-    /// The candidates, which refer to their columns by index.
+    /// The candidates. They refer to their columns by index.
     pub trials: Vec<Trial>,
-    /// Columns by flight. All flights have the same number of columns.
+    /// The columns of each flight. All flights have the same number of columns.
     pub columns: Vec<Vec<Column>>,
 }
 
-/// Computes the regressors of the candidates `entries` for `flights` under `model`. `refined` holds additional points
-/// at which nonlinear candidates are linearised: identifier and coefficients.
+/// Computes the regressors of the candidates `entries` for `flights` and `model`. `refined` holds additional points at which
+/// nonlinear candidates are linearised. An entry is the id of a candidate with the values of its coefficients.
 pub fn columns(
     model: &GreyBox,
     flights: &[Ready],
@@ -114,8 +116,8 @@ fn starts(entry: &Entry) -> &'static [&'static [f64]] {
     entry.about.entry.map_or(&[], |e| e.starts)
 }
 
-/// Points of linearisation at which an input effect is weaker than at its first starting value. Accurate sensors may
-/// detect such weak effects. Empty for all other effects.
+/// Two points of linearisation at which an input effect is weaker than at its first starting value, because accurate sensors may
+/// detect such weak effects. Empty for other effects.
 fn smaller(entry: &Entry) -> Vec<Vec<f64>> {
     let (Some(first), Some(last)) = (starts(entry).first(), starts(entry).last()) else {
         return Vec::new();
@@ -123,7 +125,7 @@ fn smaller(entry: &Entry) -> Vec<Vec<f64>> {
     if !entry.operator {
         return Vec::new();
     }
-    // decreasing starting values belong to a limit: a higher limit is a weaker effect
+    // if the starting values decrease, the coefficient is a limit, and the effect is weaker with a higher limit
     let factor = if first[0] < last[0] { 1.0 / SMALLER } else { SMALLER };
     vec![vec![first[0] * factor.powi(2)], vec![first[0] * factor]]
 }
@@ -133,8 +135,8 @@ pub fn straight(entry: &Entry) -> bool {
     starts(entry).is_empty()
 }
 
-/// Adds all of `entries` to `model`, except those that cannot be added. Returns this model, and the added entries with
-/// their coefficients. The coefficients are zero or the bound nearest to zero.
+/// Adds all of `entries` to a copy of `model`, except those that cannot be added. Returns this model, and the added entries with
+/// the values of their coefficients: zero, or the bound nearest to zero.
 pub fn with_all(model: &GreyBox, entries: &[Entry]) -> (GreyBox, Vec<(Entry, Vec<f64>)>) {
     let mut everything = model.clone();
     let mut joined = Vec::new();
@@ -145,15 +147,15 @@ pub fn with_all(model: &GreyBox, entries: &[Entry]) -> (GreyBox, Vec<(Entry, Vec
             joined.push((*e, values));
         }
     }
-    // added effects may set coefficients to zero that they replace: these get their values back
+    // added effects may have set coefficients that they replace to zero; these get their values back
     for c in model.coefficients() {
         everything.set_coefficient(&c.name, c.value);
     }
     (everything, joined)
 }
 
-/// Indices of the coefficients that a search estimates: all except linear coefficients that are 1 in every starting
-/// point of the effect.
+/// Indices of the coefficients that the search estimates. Linear coefficients that are 1 in every list of starting values of the
+/// effect are not estimated.
 pub fn free(entry: &Entry) -> Vec<usize> {
     let linear = entry.about.coefficients.len() - entry.about.shape;
     (0..entry.about.coefficients.len())
@@ -164,7 +166,7 @@ pub fn free(entry: &Entry) -> Vec<usize> {
 }
 
 impl Columns {
-    /// Adds the linear candidates. One model with all of `entries` gives their columns in a single pass.
+    /// Adds the linear candidates `entries`. A single model with all of them gives their columns in one pass over the flights.
     fn add_linear(&mut self, model: &GreyBox, flights: &[Ready], entries: &[Entry]) {
         let (everything, joined) = with_all(model, entries);
         let wanted = model.coefficients().len()..everything.coefficients().len();
@@ -177,7 +179,7 @@ impl Columns {
                 let (low, high) = model.size().bounds(c);
                 (k, next + k, [low, high])
             });
-            // coefficients without effect in the flights, for example of a missing rudder, stay at zero
+            // coefficients that have no effect in the flights, such as those of a missing rudder, are not free
             let free = free.filter(|(_, column, _)| self.acts(*column)).collect();
             let trial = Trial {
                 id: e.about.id,
@@ -221,13 +223,14 @@ impl Columns {
         });
     }
 
-    /// Whether a column has a nonzero entry in any flight.
+    /// Whether the column with index `column` has a nonzero entry in any flight.
     fn acts(&self, column: usize) -> bool {
         let moved = |x: &f64| *x != 0.0;
         self.columns.iter().any(|list| list[column].iter().flatten().any(moved))
     }
 
-    /// Records the channels in which the candidate `trial` acts. Keeps the candidate if it acts in any channel.
+    /// Sets the channels (forces and moments) in which the candidate `trial` acts, and its number of independent rows. Adds the
+    /// candidate to the list if it acts in any channel.
     fn finish(&mut self, mut trial: Trial, flights: &[Ready]) {
         let own: Vec<usize> = trial
             .points
@@ -251,8 +254,8 @@ impl Columns {
     }
 }
 
-/// Columns of a nonlinear candidate at `values` for each flight: the contribution, then the derivatives with respect to
-/// the free coefficients. `None` if the candidate cannot be added to the model with these values.
+/// Columns of a nonlinear candidate whose coefficients are `values`, for each flight: the candidate's contribution, then its
+/// derivatives with respect to the free coefficients. `None` if the candidate cannot be added to the model with these values.
 fn curved_columns(
     model: &GreyBox,
     flights: &[Ready],

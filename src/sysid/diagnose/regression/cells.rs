@@ -1,5 +1,5 @@
-//! Division of the windows of all flights into cells. A cell contains the windows of one channel of one flight in which
-//! the residual is finite. A run is a sequence of adjacent windows. A block is a stretch of about 4 s.
+//! Division of the windows (of the weak form) of all flights into cells. A cell contains the windows of one channel of one
+//! flight in which the residual is finite. A run is a sequence of adjacent windows. A block is a stretch of about 4 s.
 
 use nalgebra::DMatrix;
 
@@ -11,7 +11,7 @@ use crate::diagnose::regression::whiten::Whitener;
 /// Length of a block of windows whose errors are treated as correlated, s.
 pub const BLOCK_S: f64 = 4.0;
 
-/// Columns of one flight with their indices among all columns.
+/// Regressors (columns) of one flight with their indices among all regressors.
 pub type Placed = Vec<(usize, Column)>;
 
 /// The windows of one channel of one flight.

@@ -1,5 +1,7 @@
-//! Regressors (columns) of nuisance parameters and candidates. A column holds the change of forces and moments for one
-//! unit of a parameter, window by window.
+//! Regressors (columns) of the regression that searches for missing effects. A column has the change of forces and moments for
+//! one unit of a parameter. It has one row for each window, a short stretch of flight over which they are averaged.
+//!
+//! The parameters are those of candidate effects, and nuisance parameters: sensor errors and coefficients of the model.
 
 use std::ops::Range;
 
@@ -21,16 +23,16 @@ use greylag_physics::{Channel, Wrench};
 /// - delays of α, β, airspeed and accelerometers, s;
 /// - delay of the angular accelerations relative to the moments, s;
 /// - delay of the actuator record, s;
-/// - averaging ("blur") of the actuator record: half of the variance of the times over which a record is averaged, in
-///   squared sampling intervals.
+/// - averaging ("blur") of the actuator record: half of the variance of the times over which a recorded value is averaged,
+///   in squared sampling intervals.
 pub const SENSORS: usize = 16;
 
-/// A flight evaluated under a model.
+/// A flight with the predictions of a model, and their derivatives.
 #[derive(Clone, Debug)]
 pub struct Ready {
     /// The flight as measured.
     pub measured: Prepared,
-    /// The flight with deflections that have passed the model's input effects, for example an actuator lag.
+    /// The flight with the deflections after the model's input effects, for example an actuator lag.
     pub acting: Prepared,
     /// Residual, measured minus predicted: forces in N, moments in N m.
     pub residual: Column,
@@ -38,8 +40,8 @@ pub struct Ready {
     pub sensors: Vec<Column>,
     /// Derivatives of the prediction with respect to aileron, elevator and throttle, by segment and sample.
     controls: Vec<Vec<[[f64; CHANNELS]; 3]>>,
-    /// Model that predicts the accelerations in the regressors of mass and inertia. `None` for the model of the
-    /// residual.
+    /// Model that predicts the accelerations in the regressors of mass and inertia. `None` if it is the model that predicts
+    /// `residual`.
     accelerating: Option<GreyBox>,
 }
 
@@ -53,7 +55,7 @@ impl Ready {
             .map(|s| s.iter().map(|at| local::local(model, at, &at.controls)).collect())
             .collect();
         let mut columns = gather(&acting, model.integrator, 1 + INPUTS + 3 + 7, |place, add| {
-            // RK4 also evaluates the end of a step; its derivatives are approximated by those at the start
+            // RK4 also evaluates the end of a step; the derivatives there are approximated by those at its start
             let here = &locals[place.segment][place.index];
             let value = if place.at.time_s == acting.segments[place.segment][place.index].time_s {
                 here.value
@@ -90,7 +92,7 @@ impl Ready {
                 let slope = &here.slope[CONTROLS + i];
                 (0..CHANNELS).for_each(|c| add(1 + INPUTS + 9, c, bend * slope[c]));
             }
-            // delay T of the angular acceleration, J ω̇ + ω × J ω = M(t − T), to first order: T Σ ∂(ω × J ω − M)/∂x ẋ
+            // the effect of a delay T in J ω̇ + ω × J ω = M(t − T) is to first order T Σ ∂(ω × J ω − M)/∂x ẋ
             if acting.sampling == Sampling::Instants {
                 let rates = differences(&acting, place.segment, place.index, inputs);
                 for (slope, rate) in here.slope.iter().zip(rates) {
@@ -117,17 +119,17 @@ impl Ready {
         Ready { measured: flight.clone(), acting, residual, sensors, controls, accelerating }
     }
 
-    /// Replaces the model whose predicted accelerations enter the regressors of mass and inertia. `None` stands for the
-    /// model of the residual.
+    /// Sets the model that predicts the accelerations in the regressors of mass and inertia. `None` is the model that predicts
+    /// `residual`.
     pub fn accelerating_as(self, model: Option<&GreyBox>) -> Ready {
         Ready { accelerating: model.cloned(), ..self }
     }
 
-    /// Regressors of the coefficients `wanted` of `model`: predicted forces and moments for one unit of each
-    /// coefficient. `model` must contain the effects of the flight's model. The columns of shape constants (nonlinear
-    /// coefficients) and of coefficients of input effects are empty.
+    /// Regressors of the coefficients with the indices `wanted` in `model`: predicted forces and moments for one unit of each
+    /// coefficient. `model` must have at least the effects of the model of this flight. The columns of nonlinear coefficients and
+    /// of coefficients of input effects are empty.
     pub fn linear(&self, model: &GreyBox, wanted: Range<usize>) -> Vec<Column> {
-        // a formula with a lag needs earlier deflections, which the flight's own model may not have stored
+        // a formula with a lag needs lagged deflections, which the model of this flight may not have computed
         let remembered = (model.lags() > 0).then(|| self.measured.acting(model));
         let acting = remembered.as_deref().unwrap_or(&self.acting);
         let mut columns = gather(acting, model.integrator, wanted.len(), |place, add| {
@@ -164,8 +166,8 @@ impl Ready {
         columns
     }
 
-    /// Regressor of a parameter of mass or inertia. A change of the parameter by `step` changes the rigid body to
-    /// `body`. The accelerations are predicted, because measured accelerations contain the same noise as the residual.
+    /// Regressor of a parameter of mass or inertia. A change of the parameter by `step` changes the rigid body of `model` to
+    /// `body`. The accelerations are predicted, because measured ones contain the same noise as the residual.
     fn body(&self, model: &GreyBox, body: &RigidBody, step: f64) -> Column {
         let old = &model.body;
         let model = self.accelerating.as_ref().unwrap_or(model);
@@ -189,8 +191,8 @@ impl Ready {
         columns.pop().unwrap_or_default()
     }
 
-    /// Contribution of an input effect that `model` has in addition to the flight's model: difference of the
-    /// predictions of both models, to first order in the changes of deflections and throttle.
+    /// Contribution of an input effect that `model` has in addition to the model of this flight: the difference of the
+    /// predictions of the two models, to first order in the changes of deflections and throttle.
     pub fn operator(&self, model: &GreyBox) -> Column {
         let other = self.measured.acting(model);
         let mut columns = gather(&self.acting, model.integrator, 1, |place, add| {
@@ -205,7 +207,7 @@ impl Ready {
     }
 }
 
-/// Sum of `columns`, weighted with `weights`.
+/// The sum of `columns` with the weights `weights`.
 pub fn combine(columns: &[Column], weights: &[f64]) -> Column {
     let mut sum = Column::default();
     for (column, weight) in columns.iter().zip(weights) {
@@ -229,8 +231,8 @@ pub fn of_body(model: &GreyBox, index: usize) -> bool {
     changed_body(model, index).is_some()
 }
 
-/// Perturbs the coefficient `index` of `model`. Returns the resulting rigid body and the perturbation. `None` if the
-/// body does not depend on the coefficient.
+/// Perturbs the coefficient with the index `index` of `model`. Returns the resulting rigid body and the perturbation. `None` if
+/// the rigid body does not depend on the coefficient.
 fn changed_body(model: &GreyBox, index: usize) -> Option<(RigidBody, f64)> {
     const MOVED: f64 = 1e-3;
     let mut moved = model.clone();
@@ -239,7 +241,7 @@ fn changed_body(model: &GreyBox, index: usize) -> Option<(RigidBody, f64)> {
     (moved.body != model.body).then_some((moved.body, MOVED))
 }
 
-/// Adds J ω̇, the moment of the measured angular acceleration, to the residual.
+/// Adds J ω̇ with the measured angular acceleration ω̇ to the residual of the moments.
 fn add_spin(model: &GreyBox, flight: &Prepared, residual: &mut Column) {
     let spins = rates(flight, |i| [i.state.p, i.state.q, i.state.r]);
     let moments: Vec<Vector<f64>> = spins.iter().map(|w| inertia(&model.body, *w)).collect();

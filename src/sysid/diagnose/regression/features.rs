@@ -1,4 +1,5 @@
-//! Flexible model without physics: random Fourier features of state, deflections and earlier deflections.
+//! Regressors of a flexible model without physics: random Fourier features of state, deflections and earlier deflections. A
+//! diagnosis uses the model to estimate how much of the residual any function of these variables could remove.
 
 use std::f64::consts::TAU;
 
@@ -21,10 +22,10 @@ const COSINES: usize = 40;
 const VARIABLES: usize = 12;
 /// Number of features: the variables themselves and the cosines.
 pub const COUNT: usize = VARIABLES + COSINES;
-/// Standard deviation of the cosines' frequencies, rad per standard deviation of a variable. A feature varies by about one
-/// half-period over the flights.
+/// Standard deviation of the cosines' frequencies, rad per standard deviation of a variable. Over the range of the flights,
+/// a cosine then varies by about half a period.
 const BEND: f64 = 0.5;
-/// Time span of the difference quotient for the rate of α, s. A shorter time would amplify noise.
+/// Time span of the difference quotient for the rate of α, s. A shorter span would amplify noise.
 const SPAN_S: f64 = 0.06;
 /// Delay of the earlier deflections, s.
 const AGO_S: f64 = 0.08;
@@ -35,8 +36,8 @@ struct Cosine {
     phase: f64,
 }
 
-/// Columns of the features for every flight, multiplied by dynamic pressure times wing area (N). All force channels
-/// have the same columns. All moment channels have the same columns.
+/// Regressor columns for every flight: the features multiplied by dynamic pressure times wing area (N). The three forces have
+/// the same columns, and so have the three moments.
 pub fn features(model: &GreyBox, flights: &[Ready], seed: u64) -> Vec<Vec<Column>> {
     let spread = spread(flights, variables);
     let mut random = stream(seed, &[FEATURES]);
@@ -45,7 +46,7 @@ pub fn features(model: &GreyBox, flights: &[Ready], seed: u64) -> Vec<Vec<Column
         let one = gather(&flight.acting, Integrator::Jsbsim, COUNT, |place, add| {
             let z = standard(variables(&flight.acting, place.segment, place.index), &spread);
             let pressure = model.air(&place.at.state, place.at.altitude).q_s;
-            // forces are averaged over samples, moments over steps: one column for forces, one for moments
+            // forces are averaged over samples and moments over steps, so channels 0 (force) and 3 (moment) are computed
             for channel in [0, 3] {
                 for (k, z) in z.iter().enumerate() {
                     add(k, channel, pressure * z);
@@ -95,8 +96,8 @@ fn variables(flight: &Prepared, segment: usize, index: usize) -> [f64; VARIABLES
     ]
 }
 
-/// Mean and standard deviation of each variable over all flights. `of` returns the variables of a flight at a given
-/// segment and sample.
+/// Mean and standard deviation of each variable over all flights. `of` returns the variables of a flight for the index of a
+/// segment and the index of a sample in it.
 pub fn spread<const N: usize>(
     flights: &[Ready],
     of: impl Fn(&Prepared, usize, usize) -> [f64; N],
@@ -120,7 +121,7 @@ pub fn spread<const N: usize>(
     })
 }
 
-/// Standardised variables: `raw` minus the mean, in standard deviations.
+/// Standardised variables: `raw` minus the means, in standard deviations. `spread` holds means and standard deviations.
 pub fn standard<const N: usize>(raw: [f64; N], spread: &[[f64; 2]; N]) -> [f64; N] {
     std::array::from_fn(|k| (raw[k] - spread[k][0]) / spread[k][1])
 }

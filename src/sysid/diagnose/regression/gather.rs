@@ -1,5 +1,5 @@
-//! Averages over every window of a flight, weighted by the kernel. Overlapping windows share the evaluation of a
-//! sample.
+//! Averages forces and moments over the windows of a flight. A window is a short interval of samples, weighted by a smooth
+//! function (kernel). Windows overlap, and each sample in an overlap is evaluated once for all of them.
 
 use rayon::prelude::*;
 
@@ -13,7 +13,7 @@ use greylag_physics::Controls;
 /// Values for each window in each of the channels D, L, Y, l, m, n; an empty list means zeros.
 pub type Column = [Vec<f64>; CHANNELS];
 
-/// Number of adjacent windows that one task processes. Samples in their overlap are evaluated once.
+/// Number of adjacent windows that one task processes.
 const GROUP: usize = 16;
 /// Largest number of windows to which one sample contributes.
 const OVERLAP: usize = 4;
@@ -31,8 +31,8 @@ pub struct Place<'a> {
     pub controls: &'a Controls,
 }
 
-/// Averages forces and moments over each window and returns them as `columns` columns. At each sample, `evaluate`
-/// reports the terms of the average with `add(column, channel, amount)`.
+/// Averages `columns` sets of forces and moments over each window. For each sample, `evaluate` reports the contributions to
+/// the sets with `add(column, channel, amount)`.
 ///
 /// Forces are averaged over the samples. Moments are averaged over integration steps, or over the samples if these are
 /// values at instants.
@@ -66,7 +66,7 @@ pub fn gather(
     out
 }
 
-/// Runs of at most [`GROUP`] windows of one segment: first window, last window + 1.
+/// Groups of at most [`GROUP`] successive windows of one segment, as ranges: first window, last window + 1.
 fn groups(flight: &Prepared) -> Vec<(usize, usize)> {
     let mut groups: Vec<(usize, usize)> = Vec::new();
     for (w, window) in flight.windows.iter().enumerate() {
@@ -134,7 +134,8 @@ fn group(
     sums
 }
 
-/// Rates (1/s) of the quantities `of` for every window, by the kernel's derivative (smoothed differentiation).
+/// Rates of change (per second) of the quantities `of` in every window. The samples are weighted with the kernel's derivative,
+/// which differentiates and smooths.
 pub fn rates<const N: usize>(
     flight: &Prepared,
     of: impl Fn(&Instant) -> [f64; N],

@@ -1,4 +1,5 @@
-//! Residual at one sample, with its derivatives with respect to measured quantities.
+//! Residual (measured minus predicted forces and moments) at one sample, with its derivatives with respect to measured
+//! quantities.
 
 use crate::flight_path::reconstruction::Instant;
 use crate::weak_form::windows::{gyroscopic, to_force_axes};
@@ -11,15 +12,15 @@ use greylag_physics::{Channel, Controls, State};
 pub const CHANNELS: usize = 6;
 /// Number of inputs: p, q, r, α, β, V, then aileron, elevator, throttle, rudder.
 pub const INPUTS: usize = 10;
-/// Index of the first rate among the inputs.
+/// Index of the first body rate among the inputs.
 pub const RATES: usize = 0;
-/// Index of the angle of attack; sideslip and airspeed follow.
+/// Index of the angle of attack among the inputs; sideslip and airspeed follow.
 pub const ALPHA: usize = 3;
-/// Index of the aileron; elevator, throttle and rudder follow.
+/// Index of the aileron among the inputs; elevator, throttle and rudder follow.
 pub const CONTROLS: usize = 6;
 
-/// Residual (measured minus predicted) at one sample. It lacks the moment of the angular acceleration, which the kernel
-/// computes from the rates.
+/// Residual at one sample. The moment that causes the angular acceleration is not included; it is computed later from the body
+/// rates.
 #[derive(Clone, Copy, Debug)]
 pub struct Local {
     /// The residual, N or N m. Forces are NaN if the log has no specific force.
@@ -28,7 +29,7 @@ pub struct Local {
     pub slope: [[f64; CHANNELS]; INPUTS],
 }
 
-/// Computes the residual of `model` and its derivatives at the sample `at` with `controls`.
+/// Computes the residual of `model` and its derivatives at the sample `at` with the deflections `controls`.
 pub fn local(model: &GreyBox, at: &Instant, controls: &Controls) -> Local {
     type D = Dual<INPUTS>;
     let s = &at.state;

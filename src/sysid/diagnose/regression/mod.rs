@@ -1,4 +1,4 @@
-//! Regression for the ranking of candidates: regressors, whitening, elimination of nuisance parameters
+//! Linear regression by which candidate effects are ranked: regressors, whitening, and elimination of the nuisance parameters
 //! (Frisch–Waugh–Lovell).
 
 pub(super) mod catalogue;

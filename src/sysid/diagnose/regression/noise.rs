@@ -1,5 +1,8 @@
-//! Noise of each channel: whitening filter, variance, and whitened noise by block. The noise is the residual of a ridge
-//! regression on the columns of all coefficients and candidates (rich fit).
+//! Estimate of the noise of each channel (a force or a moment): a filter that whitens it, its variance, and its whitened values.
+//!
+//! The data are means over windows, which are short stretches of flight. A cell contains the windows of one channel of one
+//! flight. A block is a stretch of about 4 s. A column is a regressor. The noise is what a ridge regression of the model's
+//! residual leaves unexplained if all coefficients of the model and all candidate effects are regressors.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -7,26 +10,26 @@ use crate::diagnose::regression::cells::{Cell, Cells, Placed};
 use crate::diagnose::regression::local::CHANNELS;
 use crate::diagnose::regression::whiten::Whitener;
 
-/// Order of the autoregressive whitening.
+/// Order of the autoregressive whitening filter.
 const ORDER: usize = 8;
-/// Ridge parameter of the regression, relative to a column's squared norm.
+/// Ridge parameter of the regression, as a fraction of a column's squared norm.
 const RIDGE: f64 = 1e-4;
-/// Number of alternations between whitening and regression.
+/// Number of whitening filters that are fitted one after the other, each to the residual of a regression with the filter before.
 const PASSES: usize = 2;
 
 /// Noise of every channel.
 #[derive(Clone)]
 pub struct Noise {
-    /// Whitener of each channel.
+    /// Whitening filter of each channel. It scales the noise to a variance of 1.
     pub whiteners: [Whitener; CHANNELS],
-    /// Whitened residual of the regression, one list for each cell. The regression reduces the variance of each block;
-    /// the residual is corrected for this reduction.
+    /// Whitened noise, one list for each cell. The regression reduces the variance of its residual in each block. The noise is
+    /// corrected for this reduction.
     pub residuals: Vec<Vec<f64>>,
 }
 
 impl Noise {
-    /// Estimates the noise as the residual of a regression of the column `last` on all other columns. `rich` holds the
-    /// columns by flight.
+    /// Estimates the noise by a regression of the column with index `last`, the model's residual, on all other columns. `rich`
+    /// holds the columns of each flight.
     pub fn estimate(cells: &Cells, rich: &[Placed], last: usize) -> Noise {
         let mut residuals = vec![Vec::new(); cells.list.len()];
         let whiteners = std::array::from_fn(|channel| {
@@ -40,7 +43,7 @@ impl Noise {
     }
 }
 
-/// Whitened rows of one cell: regressors, then the residual that is fitted.
+/// Whitened data of one cell: the regressors `x`, and the model's residual `y` that they are fitted to.
 struct Rows {
     x: DMatrix<f64>,
     y: DVector<f64>,
@@ -92,7 +95,7 @@ fn rows(cell: &Cell, rich: &[Placed], last: usize, whitener: &Whitener) -> Rows 
     Rows { x, y }
 }
 
-/// Solution of a ridge regression with scaled columns.
+/// Solution of the ridge regression. The columns are scaled to unit norm before the ridge is added.
 struct Fit {
     scale: DVector<f64>,
     inverse: Cholesky<f64, Dyn>,
@@ -120,8 +123,8 @@ impl Fit {
         Some(Fit { scale, inverse, solution })
     }
 
-    /// The residual of `rows`, with each block b multiplied by (I − H_bb)^(−1/2), where H is the hat matrix. This
-    /// restores the variance before the regression (Bell and McCaffrey 2002, "CR2").
+    /// The residual of the regression in `rows`, with each block b multiplied by (I − H_bb)^(−1/2), where H is the hat matrix.
+    /// This restores the variance that the noise has without the regression (Bell and McCaffrey 2002, "CR2").
     fn unshrunk(&self, cell: &Cell, rows: &Rows) -> Vec<f64> {
         let left = &rows.y - &rows.x * &self.solution;
         let mut out = vec![0.0; left.len()];
@@ -137,7 +140,8 @@ impl Fit {
                 .unwrap_or_else(|| DMatrix::zeros(scaled.nrows(), scaled.ncols()));
             let hat = half.tr_mul(&half);
             let turn = (DMatrix::identity(to - from, to - from) - hat).symmetric_eigen();
-            // the floor limits the correction of blocks that the regression reproduces almost completely
+            // the eigenvalues have a lower bound, because the correction of a block that the regression almost reproduces would
+            // be too large
             let root = turn.eigenvalues.map(|e| e.max(0.04).sqrt().recip());
             let part = turn.eigenvectors.tr_mul(&left.rows(from, to - from));
             let part = &turn.eigenvectors * part.component_mul(&root);
@@ -147,7 +151,7 @@ impl Fit {
     }
 }
 
-/// The residual before whitening, one list for each run of adjacent windows.
+/// The residual of the regression `fit` in the data before whitening, one list for each sequence of adjacent windows.
 fn raw_residual(cell: &Cell, rich: &[Placed], last: usize, fit: &Fit) -> Vec<Vec<f64>> {
     let mut left = vec![0.0; cell.windows.iter().max().map_or(0, |w| w + 1)];
     for (place, column) in &rich[cell.flight] {

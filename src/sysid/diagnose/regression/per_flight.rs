@@ -1,4 +1,5 @@
-//! Regressors (columns) of the constants of each flight: misalignment angles and trims.
+//! Regressors (columns) of the constants of each flight: misalignment angles of the measured axes, and trims, which are
+//! constants added to force and moment coefficients.
 
 use crate::diagnose::regression::columns::Ready;
 use crate::diagnose::regression::gather::{Column, gather, rates};

@@ -1,5 +1,8 @@
-//! Regression on the candidates' columns after the nuisance parameters are projected out (Frisch–Waugh–Lovell), block
-//! by block.
+//! The regression of the residual on the columns (regressors) of candidate effects, after the nuisance parameters were projected
+//! out of both (Frisch–Waugh–Lovell). Its Gram matrices are computed for each block, a stretch of about 4 s of a flight.
+//!
+//! Residual and columns are whitened: filtered so that the noise becomes white. The prior of the nuisance parameters acts like
+//! further rows, called its pseudo-observations.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -8,7 +11,8 @@ use crate::diagnose::regression::cells::{Cells, Placed};
 use crate::diagnose::regression::noise::Noise;
 use crate::diagnose::regression::whiten::Whitener;
 
-/// A nuisance parameter: a coefficient of the model, a constant of a flight, or a sensor error.
+/// A nuisance parameter: a coefficient of the model, a constant of a flight, or a sensor error. It must be estimated but is not
+/// of interest.
 #[derive(Clone, Debug)]
 pub struct Known {
     /// Name of the parameter.
@@ -25,7 +29,7 @@ impl Known {
     }
 }
 
-/// Gram matrices of the projected candidate columns. The last column is the projected residual.
+/// The columns of the candidates after the projection, with their Gram matrices. The last column is the projected residual.
 pub struct Projected {
     /// Gram matrix of each block.
     pub blocks: Vec<DMatrix<f64>>,
@@ -33,30 +37,30 @@ pub struct Projected {
     pub prior: DMatrix<f64>,
     /// Sum of `prior` and of the Gram matrices of all blocks.
     pub total: DMatrix<f64>,
-    /// Products of the candidate columns with the noise, by block.
+    /// For each block: scalar products of the columns of the candidates with the noise.
     pub noise: Vec<DVector<f64>>,
-    /// Square root of `prior` for the candidates. Its product with standard normal random numbers is a random draw of
-    /// the prior's contribution to the products of the candidates with the residual.
+    /// Square root of `prior` for the candidates. Multiplied by standard normal random numbers, it gives a random draw of the
+    /// contribution of the prior to the products of the candidates with the residual.
     pub prior_root: DMatrix<f64>,
     /// Estimates of the nuisance parameters without any candidate, relative to the point of linearisation.
     pub tuned: DVector<f64>,
-    /// Regression coefficients of each column on the nuisance parameters. One unit of a candidate lowers the estimates
-    /// of the nuisance parameters by its column of this matrix.
+    /// Coefficients of the regression of each column on the columns of the nuisance parameters. One unit of a candidate lowers
+    /// the estimates of the nuisance parameters by the candidate's column of this matrix.
     pub taken: DMatrix<f64>,
     /// Covariance of the nuisance parameters without any candidate.
     pub covariance: DMatrix<f64>,
-    /// Sum of squares of the residual, and number of rows, by block and channel.
+    /// For each block and channel: sum of squares of the projected residual, and number of rows.
     pub by_channel: Vec<[(f64, usize); 6]>,
-    /// Projected columns of the candidates and the residual, by cell.
+    /// Projected columns of candidates and residual in each cell (the windows of one channel of one flight).
     pub rows: Vec<DMatrix<f64>>,
 }
 
 impl Projected {
-    /// Projects the nuisance parameters out of the columns `placed`, which holds a list for each flight. The columns of
-    /// the nuisance parameters have the indices from 0, followed by the candidates. The residual has the index `last`.
+    /// Projects the nuisance parameters out of the columns `placed`, which has one list for each flight. The nuisance parameters
+    /// have the first indices, then come the candidates, and the residual has the index `last`.
     ///
-    /// `shared` holds, by index, the bias of the columns' products with the residual due to common noise; missing
-    /// entries are zero. `None` if the nuisance parameters cannot be estimated.
+    /// For each index, `shared` has the bias of the product of the column with the residual that is due to noise in both. A
+    /// missing entry is zero. `None` if the nuisance parameters cannot be estimated.
     pub fn new(
         cells: &Cells,
         placed: &[Placed],
@@ -77,7 +81,7 @@ impl Projected {
             ay[(k, ny - 1)] -= shared_of(k);
             aa[(k, k)] += known.weight();
             ay[(k, ny - 1)] += known.weight() * known.offset;
-            // a parameter without information from data or prior keeps its value
+            // a parameter on which neither the flights nor the prior have information keeps its value
             if aa[(k, k)] <= 0.0 {
                 aa[(k, k)] = 1.0;
             }
@@ -123,13 +127,13 @@ impl Projected {
         std::array::from_fn(|c| self.by_channel.iter().map(|of| of[c].1 as f64).sum())
     }
 
-    /// Number of candidate columns.
+    /// Number of columns of the candidates.
     pub fn width(&self) -> usize {
         self.total.ncols() - 1
     }
 
-    /// Gram matrix of other columns after the same projection. `placed` holds these columns by flight, with the indices
-    /// of the candidates. `whiteners` holds a whitener for each channel.
+    /// Gram matrix of other columns after the same projection. `placed` has these columns for each flight, with the indices of
+    /// the candidates. `whiteners` has the whitening filter of each channel.
     pub fn others(&self, cells: &Cells, placed: &[Placed], whiteners: &[Whitener]) -> DMatrix<f64> {
         let (na, ny) = (self.taken.nrows(), self.taken.ncols());
         let mut gram = DMatrix::zeros(ny, ny);
@@ -141,13 +145,13 @@ impl Projected {
         gram
     }
 
-    /// Gram matrices over all blocks, each used once.
+    /// The Gram matrices of all blocks, each used once.
     pub fn grams(&self) -> Grams<'_> {
         let blocks = self.blocks.iter().collect();
         Grams { blocks, prior: &self.prior, total: self.total.clone() }
     }
 
-    /// Gram matrices of a bootstrap sample with the blocks `blocks`. A block may occur several times or not at all.
+    /// The Gram matrices of a bootstrap sample that has the blocks `blocks`. A block may occur several times or not at all.
     pub fn resampled(&self, blocks: impl Iterator<Item = usize>) -> Grams<'_> {
         let blocks: Vec<&DMatrix<f64>> = blocks.map(|b| &self.blocks[b]).collect();
         let mut total = self.prior.clone();
@@ -156,7 +160,7 @@ impl Projected {
     }
 }
 
-/// Gram matrices of candidate columns and residual over a selection of blocks.
+/// Gram matrices of the columns of candidates and residual in a selection of blocks.
 pub struct Grams<'a> {
     /// Gram matrix of each selected block.
     pub blocks: Vec<&'a DMatrix<f64>>,
@@ -166,7 +170,8 @@ pub struct Grams<'a> {
     pub total: DMatrix<f64>,
 }
 
-/// Inverse of a symmetric matrix whose rows may differ widely in size. `None` if the matrix is not positive definite.
+/// Inverse of a symmetric matrix whose rows may differ widely in size. The matrix is scaled first. `None` if it is not positive
+/// definite.
 pub fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = matrix.diagonal().map(|d| d.max(f64::MIN_POSITIVE).sqrt().recip());
     let n = matrix.nrows();
@@ -178,8 +183,8 @@ pub fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }
 
-/// Square root of the Gram matrix of the prior's pseudo-observations: one row for each nuisance parameter, one column
-/// for each candidate, and the residual as the last column.
+/// The pseudo-observations of the prior, a square root of their Gram matrix. There is one row for each nuisance parameter and one
+/// column for each candidate. The last column is the residual.
 fn root_of_prior(known: &[Known], taken: &DMatrix<f64>) -> DMatrix<f64> {
     let mut root = -taken.clone();
     let last = root.ncols() - 1;
@@ -190,7 +195,7 @@ fn root_of_prior(known: &[Known], taken: &DMatrix<f64>) -> DMatrix<f64> {
     root
 }
 
-/// Products of the whitened columns of the `na` nuisance parameters with one another, and with the `ny` columns of
+/// Scalar products of the whitened columns of the `na` nuisance parameters with one another, and with the `ny` columns of
 /// candidates and residual.
 fn products_of_known(
     whitened: &[(Vec<usize>, DMatrix<f64>)],
@@ -215,7 +220,7 @@ fn products_of_known(
     (aa, ay)
 }
 
-/// Columns of the candidates and the residual in one cell, minus the part that the nuisance parameters explain.
+/// Columns of candidates and residual in one cell, less the part that the nuisance parameters explain.
 fn project(
     places: &[usize],
     z: &DMatrix<f64>,
@@ -234,7 +239,7 @@ fn project(
 }
 
 fn block_grams(cells: &Cells, rows: &[DMatrix<f64>], ny: usize) -> Vec<DMatrix<f64>> {
-    // cell, first row and last row + 1 of the parts of each block, in the order of the cells
+    // for each block, its parts in the order of the cells: index of the cell, first row and last row + 1
     let mut parts: Vec<Vec<(usize, usize, usize)>> = vec![Vec::new(); cells.blocks()];
     for (k, cell) in cells.list.iter().enumerate() {
         for (block, from, to) in cell.rows_of_blocks() {
@@ -266,7 +271,7 @@ fn by_channel(cells: &Cells, rows: &[DMatrix<f64>], ny: usize) -> Vec<[(f64, usi
     sums
 }
 
-/// Products of the candidate columns with the noise `residuals`, by block.
+/// For each block: scalar products of the columns of the candidates with the noise `residuals`.
 fn noise_products(
     cells: &Cells,
     rows: &[DMatrix<f64>],

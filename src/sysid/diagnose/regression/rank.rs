@@ -1,5 +1,6 @@
-//! Evidence for each candidate: the smaller of the penalised likelihood gain (as in the BIC) and the block-robust Wald
-//! statistic.
+//! Evidence for each candidate, an effect that the model may lack. It is the smaller of the penalised likelihood gain (as in
+//! the BIC) and a Wald statistic with a block-robust covariance. The data are whitened regressor columns and residuals, from
+//! which the model's own coefficients have been projected out. Blocks are sections of the flights.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,17 +9,17 @@ use crate::diagnose::regression::projected::{Grams, scaled_inverse};
 /// A point at which a candidate is linearised.
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// Values of all coefficients of the candidate.
+    /// Values of all coefficients of the candidate at this point.
     pub values: Vec<f64>,
-    /// Index of the column that holds the contribution at this point. `None` for a linear candidate, which is
-    /// linearised at zero contribution.
+    /// Index of the column with the candidate's contribution to the forces and moments at this point. `None` for a linear
+    /// candidate, which is linearised at zero contribution.
     pub contribution: Option<usize>,
-    /// Free coefficients: index in `values`, index of the column with the derivative, and range of values in which the
-    /// linearisation is used.
+    /// Free coefficients, each with its index in `values`, the index of the column with the derivative, and the range of values
+    /// in which the linearisation is used.
     pub free: Vec<(usize, usize, [f64; 2])>,
 }
 
-/// A candidate effect, with the indices of its columns.
+/// A candidate effect, with the indices of its regressor columns.
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// Identifier of the effect.
@@ -38,22 +39,22 @@ pub struct Score {
     pub evidence: f64,
     /// Block-robust Wald statistic of the free coefficients.
     pub wald: f64,
-    /// Ranking criterion: the geometric mean of penalised gain and Wald statistic, or the evidence if this is not
-    /// positive. Among strong effects, a ranking by evidence would favour those that are evenly spread over the blocks.
+    /// Ranking criterion: the geometric mean of penalised gain and Wald statistic, or the evidence if that is not
+    /// positive. A ranking by evidence would favour strong effects that are evenly spread over the blocks.
     pub order: f64,
-    /// Reduction of the whitened residual sum of squares.
+    /// Reduction of the whitened residual sum of squares by the candidate.
     pub fall: f64,
     /// Estimated values of all coefficients of the effect.
     pub values: Vec<f64>,
     /// Standard deviations of the free coefficients; zero for the other coefficients.
     pub deviations: Vec<f64>,
-    /// Indices and weights of the columns in the fitted contribution.
+    /// The columns whose weighted sum is the fitted contribution, each as index and weight.
     pub weights: Vec<(usize, f64)>,
     /// Index of the point of linearisation among the candidate's points.
     pub point: usize,
 }
 
-/// Products of the candidate columns with a residual, measured or drawn at random.
+/// Products of the candidate columns with a residual. The residual is measured or drawn at random.
 pub struct Draw {
     /// Products summed over all blocks and the prior's pseudo-observations.
     pub total: DVector<f64>,
@@ -62,7 +63,7 @@ pub struct Draw {
 }
 
 impl Draw {
-    /// Products with the measured residual.
+    /// The products with the measured residual.
     pub fn measured(p: &Grams) -> Draw {
         let last = p.total.ncols() - 1;
         let of = |m: &DMatrix<f64>| m.view((0, last), (last, 1)).column(0).into_owned();
@@ -120,8 +121,8 @@ impl Trial {
         })
     }
 
-    /// Limits `step` to the range of the linearisation, one coefficient after the other. Also returns whether a
-    /// coefficient was limited.
+    /// Limits `step` to the range of the linearisation, one coefficient after the other. Returns the limited step, and whether
+    /// a coefficient was limited.
     fn within(
         &self,
         point: &Point,
@@ -181,8 +182,8 @@ fn pick(vector: &DVector<f64>, columns: &[usize]) -> DVector<f64> {
     DVector::from_iterator(columns.len(), columns.iter().map(|c| vector[*c]))
 }
 
-/// Wald statistic θ' V⁻¹ θ of the coefficients `theta`, and their standard deviations. The scatter of the blocks
-/// determines the covariance V.
+/// Wald statistic θ' V⁻¹ θ of the coefficients `theta`, and their standard deviations. The covariance V is estimated from
+/// the scatter of the blocks.
 fn joint_wald(
     p: &Grams,
     draw: &Draw,
@@ -201,14 +202,14 @@ fn joint_wald(
         meat += correction * &score * score.transpose();
     }
     let covariance = inverse * meat * inverse;
-    // the scatter of the blocks may be smaller by chance than the noise allows
+    // by chance, the scatter of the blocks may be smaller than the white noise requires
     let deviations =
         (0..columns.len()).map(|k| covariance[(k, k)].max(inverse[(k, k)]).sqrt()).collect();
     let wald = scaled_inverse(&covariance).map_or(0.0, |v| theta.dot(&(v * theta)));
     (wald, deviations)
 }
 
-/// Wald statistic for the amplitude of a contribution with fixed `weights`. Zero if the amplitude is not positive.
+/// Wald statistic for the amplitude of a contribution whose shape is fixed by `weights`. Zero if the amplitude is not positive.
 fn ray_wald(p: &Grams, draw: &Draw, weights: &[(usize, f64)], linear: f64, square: f64) -> f64 {
     if square <= 0.0 {
         return 0.0;
@@ -224,8 +225,8 @@ fn ray_wald(p: &Grams, draw: &Draw, weights: &[(usize, f64)], linear: f64, squar
     if amount > 0.0 && meat > 0.0 { linear * linear / meat } else { 0.0 }
 }
 
-/// Standard deviations of the first coefficient in a joint fit of `columns`. The first is due to white noise, the
-/// second is computed from the scatter of the blocks of `null`, a draw of pure noise.
+/// Two standard deviations of the first coefficient in a joint fit of `columns`: that due to white noise, and that computed
+/// from the scatter of the blocks of `null`, a draw of pure noise. `None` if the fit is singular.
 pub fn deviations(p: &Grams, null: &Draw, columns: &[usize]) -> Option<(f64, f64)> {
     let inverse = scaled_inverse(&select(&p.total, columns))?;
     let zero = DVector::zeros(columns.len());

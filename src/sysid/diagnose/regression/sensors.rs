@@ -1,4 +1,4 @@
-//! Priors of the sensor errors that remain after the reconstruction.
+//! Priors of the sensor errors that remain after the flight-path reconstruction. The prefix `skew` denotes a delay.
 
 use crate::diagnose::regression::columns::SENSORS;
 use crate::flight_path::reconstruction::Reconstruction;
@@ -28,11 +28,12 @@ pub const NAMES: [&str; SENSORS] = [
 pub const LATE: &str = "skew_actuators";
 /// Index of the delay of the actuator record in [`NAMES`].
 pub const LATE_PLACE: usize = SENSORS - 2;
-/// Index of the averaging ("blur") of the actuator record in [`NAMES`].
+/// Index of the averaging ("blur") of the actuator record in [`NAMES`]. The averaging is half of the variance of the times
+/// over which the recorder averages a deflection.
 pub const BLUR_PLACE: usize = SENSORS - 1;
 
-/// Smallest prior standard deviations (rad/s, rad, relative, m/s², s), in the order of [`NAMES`]. Smaller values of the
-/// reconstruction are not used, because they cover only modelled errors.
+/// Smallest prior standard deviations (rad/s, rad, relative, m/s², s), in the order of [`NAMES`]. Smaller standard deviations
+/// of the reconstruction are not used, because they cover only modelled errors.
 const FLOOR: [f64; SENSORS - 3] =
     [2e-4, 2e-4, 2e-4, 1e-3, 1e-3, 3e-3, 0.01, 0.01, 0.01, 5e-4, 5e-4, 2e-3, 5e-4];
 /// Prior standard deviation of the delay of angular accelerations relative to the moments, s. The delay is 1.25 ms in a

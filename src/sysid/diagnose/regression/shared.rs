@@ -1,8 +1,9 @@
 //! Errors-in-variables bias: spurious evidence due to noise that regressors and residual have in common.
 //!
-//! Gyro noise and the error of the path are contained in the residual and in the regressors. The mean of their product
-//! is therefore not zero. This bias is estimated with additional simulated noise of the same distribution: the products
-//! of the resulting changes of regressors and residual have the same mean.
+//! The path is the reconstructed airspeed, angle of attack and sideslip. The residual and the regressors both contain gyro
+//! noise and the error of the path, so that the mean of their product is not zero. This bias is estimated with additional
+//! simulated noise of the same distribution: it changes regressors and residual, and the products of these changes have the
+//! same mean.
 
 use rand_distr::{Distribution, StandardNormal};
 
@@ -40,8 +41,8 @@ pub fn path_error(flight: &Reconstruction, dt: f64) -> PathError {
     [of(v, fx), of(alpha, (fz / speed).hypot(q)), of(beta, (fy / speed).hypot(r).hypot(0.1 * p))]
 }
 
-/// Returns `flight` with additional simulated noise of inertial sensors, vanes and airspeed. The noise of the path is
-/// filtered as in the smoother. `which` holds the index of the flight and the number of the draw.
+/// Returns `flight` with additional simulated noise of inertial sensors, vanes and airspeed. The noise of the path is filtered
+/// as in the smoother. `which` contains the index of the flight and the number of the draw.
 pub fn disturbed(flight: &Prepared, path: &PathError, seed: u64, which: [usize; 2]) -> Prepared {
     let mut random = stream(seed, &[DISTURBANCE, which[0] as u64, which[1] as u64]);
     let mut unit = || -> f64 { StandardNormal.sample(&mut random) };
@@ -102,10 +103,10 @@ fn both_ways(x: &[f64], kept: f64) -> Vec<f64> {
     back
 }
 
-/// Products of the changes of columns and residual due to simulated noise, by flight and index of the column.
+/// Products of the changes of columns and residual that simulated noise causes, by flight and index of the column.
 ///
-/// `before` holds the columns without and `after` the columns with simulated noise. The residual has the index `last`,
-/// all other columns have smaller indices.
+/// `before` are the columns without simulated noise, `after` those with it. The residual has the index `last`, and all other
+/// columns have smaller indices.
 pub fn products(
     cells: &Cells,
     before: &[Placed],

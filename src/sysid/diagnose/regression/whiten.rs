@@ -1,19 +1,21 @@
-//! Autoregressive whitening of a channel.
+//! Autoregressive whitening of the residual of a channel.
 
-/// Share of white noise that is added to the variance. No frequency then counts as free of noise.
+/// Variance of white noise that is added to the autocovariance at lag 0, as a fraction of it. No frequency then counts as
+/// free of noise.
 const FLOOR: f64 = 1e-3;
 
-/// Linear predictors of a value from the previous values, one for each order up to the largest.
+/// Linear predictors of a value from the values before it: one predictor for each order from 0 to the largest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Whitener {
-    /// `predictors[k]` holds the weights of the k previous values, the most recent first.
+    /// `predictors[k]` has the weights of the last k values, the most recent one first.
     predictors: Vec<Vec<f64>>,
     /// Standard deviation of each predictor's prediction error.
     deviations: Vec<f64>,
 }
 
 impl Whitener {
-    /// Fits predictors up to `order` to `runs` by Levinson's recursion.
+    /// Fits predictors of all orders up to `order` to `runs` by Levinson's recursion. Each run is a sequence of adjacent
+    /// windows.
     pub fn fit(runs: &[Vec<f64>], order: usize) -> Whitener {
         let mut covariance: Vec<f64> = (0..=order).map(|lag| autocovariance(runs, lag)).collect();
         if !(covariance[0].is_finite() && covariance[0] > 0.0) {
@@ -39,7 +41,8 @@ impl Whitener {
         fitted
     }
 
-    /// Prediction errors of `run`, in standard deviations. The first values are predicted with lower orders.
+    /// Returns the prediction errors of `run` divided by their standard deviation. The first values are predicted with lower
+    /// orders.
     pub fn apply(&self, run: &[f64]) -> Vec<f64> {
         let order = self.predictors.len() - 1;
         (0..run.len())
@@ -51,15 +54,15 @@ impl Whitener {
             .collect()
     }
 
-    /// Adapts the whitener to noise whose standard deviation is larger by `factor`.
+    /// Adapts the whitener to noise whose standard deviation is `factor` times as large.
     pub fn scaled(mut self, factor: f64) -> Whitener {
         self.deviations.iter_mut().for_each(|d| *d *= factor);
         self
     }
 }
 
-/// Sum of x(k) x(k + lag) divided by the number of all values. The divisor is the same for every lag, which keeps the
-/// autocovariance sequence positive definite.
+/// Sum of x(k) x(k + lag) within each run, divided by the number of all values. The divisor is the same for every lag, which
+/// keeps the autocovariance sequence positive definite.
 fn autocovariance(runs: &[Vec<f64>], lag: usize) -> f64 {
     let count: usize = runs.iter().map(Vec::len).sum();
     let of = |run: &Vec<f64>| run.iter().zip(run.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>();
@@ -76,7 +79,7 @@ mod tests {
     fn a_moving_average_becomes_white_with_unit_variance() {
         let mut random = stream(3, &[]);
         let noise: Vec<f64> = (0..20_001).map(|_| StandardNormal.sample(&mut random)).collect();
-        // half-overlapping windows share noise like this moving average
+        // windows that overlap by half have correlated noise, as the values of this moving average have
         let run: Vec<f64> = noise.windows(2).map(|w| 3.0 * (w[1] - 0.6 * w[0])).collect();
         let white = Whitener::fit(std::slice::from_ref(&run), 8).apply(&run);
         let runs = [white];

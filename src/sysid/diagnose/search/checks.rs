@@ -1,7 +1,11 @@
-//! Checks of an effect in addition to its evidence: error on held-out blocks, stability over bootstraps, consistency
-//! between flights.
+//! Checks of a candidate (an effect that the model may lack) in addition to its evidence: error on held-out blocks, stability
+//! over bootstraps, and consistency between flights. The limits of the checks are in `stepwise/examine.rs` and
+//! `stepwise/judge.rs`.
 //!
-//! The limits of the checks are in `stepwise/examine.rs` and `stepwise/judge.rs`.
+//! The checks use the regression of the search. Its rows are means over windows (short stretches of flight) in six channels, the
+//! forces and moments. The rows are whitened: filtered so that the noise has variance 1 and is white. A column is a regressor.
+//! The columns of nuisance parameters (coefficients of the model, constants of a flight, sensor errors) are projected out. A
+//! block is a stretch of about 4 s. A round is the search for one effect.
 
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
@@ -17,35 +21,36 @@ use greylag_num::stream::stream;
 
 /// Number of folds of the cross-validation over blocks.
 const FOLDS: usize = 5;
-/// Number of the random stream for the bootstraps.
+/// Number that separates the random stream of the bootstraps from others with the same seed.
 const BOOTSTRAPS: u64 = 82;
-/// Two effects may be indistinguishable if the correlation of their contributions exceeds this magnitude.
+/// First condition for two effects that the flights cannot distinguish: the magnitude of the correlation of their contributions
+/// exceeds this value.
 pub const ALIKE: f64 = 0.9;
-/// Two effects may be indistinguishable if their evidence differs by less than this value.
+/// Second condition: the evidence of the other effect is less than this amount below that of the effect.
 pub const CLOSE: f64 = 10.0;
-/// Uncertainty of the noise variance, relative to this variance. Without a missing effect, the mean square of the
-/// whitened residual differed from 1 by −0.03 to 0.07.
+/// Relative uncertainty of the noise variance. Without a missing effect, the mean square of the whitened residual differed from 1
+/// by −0.03 to 0.07.
 const UNSURE: f64 = 0.1;
-/// A residual sum of squares is significant if it exceeds its expectation for noise by this number of standard
-/// deviations.
+/// A residual sum of squares is significant if it exceeds its expectation for pure noise by this number of standard deviations.
 const DOUBT: f64 = 4.0;
-/// Smallest share of a flight's information on a coefficient that must come from excitation and not from noise in the
-/// regressors. With a smaller share, the flight yields no estimate.
+/// Of a flight's information on a coefficient, a part is due to noise in the regressors. If the share of the rest is not above
+/// this value, the flight yields no estimate.
 const LEAST_SIGNAL: f64 = 0.5;
-/// First condition for a candidate that merely replaces changes of existing coefficients. It reduces the sum of their
-/// squared deviations from the prior, in prior standard deviations, by more than the square of this number.
+/// First condition for a candidate that merely undoes changes of existing coefficients. The fit changes these coefficients from
+/// their prior means. The candidate reduces the sum of the squares of these changes, in prior standard deviations, by more than
+/// the square of this number.
 const PRIOR_MISFIT: f64 = 5.0;
-/// Second condition for such a candidate. The same reduction is more than this share of the candidate's reduction of
-/// the whole cost, which also contains the residual.
+/// Second condition for such a candidate. This reduction is more than this share of the candidate's reduction of the whole cost,
+/// which also contains the residual.
 const PRIOR_SHARE: f64 = 0.9;
-/// Number of candidates, the best first, that compete in a bootstrap.
+/// Number of best candidates that compete in each bootstrap.
 const COMPETING: usize = 8;
 
-/// Share of the residual beyond noise that the candidate removes from held-out blocks, in the channels in which it
-/// acts. The residual beyond noise is the whitened residual sum of squares minus its expectation for pure noise.
+/// Share of the residual beyond noise that the candidate `trial` removes in held-out blocks, in the channels in which it acts.
+/// The residual beyond noise is the whitened residual sum of squares minus its expectation for pure noise.
 ///
-/// Every fifth block is held out in turn. The candidate's coefficients are fitted to the other blocks. NaN if this fit
-/// is singular.
+/// The blocks are divided into five groups, each of which is held out once. The candidate's coefficients are fitted to the other
+/// blocks. NaN if such a fit is singular.
 pub fn heldout_reduction(round: &Round, trial: &Trial, score: &Score) -> f64 {
     let p = &round.projected;
     let last = p.width();
@@ -77,7 +82,7 @@ pub fn heldout_reduction(round: &Round, trial: &Trial, score: &Score) -> f64 {
     taken / excess(round, &trial.channels).max(taken).max(1.0)
 }
 
-/// Residual beyond noise by channel: the whitened residual sum of squares minus its expectation for pure noise.
+/// Residual beyond noise of each channel: the whitened residual sum of squares minus its expectation for pure noise.
 #[derive(Clone, Debug)]
 pub struct Beyond {
     excess: [f64; 6],
@@ -85,8 +90,8 @@ pub struct Beyond {
 }
 
 impl Beyond {
-    /// Computes the residual beyond noise of the model of `round`. The round must have no candidates. Otherwise the
-    /// noise would be estimated after a fit of all candidates, which may remove up to half of the noise of the moments.
+    /// The residual beyond noise of the model of `round`. The round must have no candidates. Otherwise all candidates would be
+    /// regressors when the noise is estimated, and might remove up to half of the noise of the moments.
     pub fn of(round: &Round) -> Beyond {
         let only = |c: usize| std::array::from_fn(|k| k == c);
         Beyond {
@@ -95,12 +100,13 @@ impl Beyond {
         }
     }
 
-    /// Returns the share of the residual beyond noise in `channels` that remains after an effect has reduced the
-    /// residual sum of squares by `fall`. `None` if the remaining residual is not significant.
+    /// The share of the residual beyond noise in `channels` that remains after an effect was added. `self` is the remaining
+    /// residual, and `fall` is the reduction of the residual sum of squares by the effect. `None` if the remaining residual is
+    /// not significant.
     pub fn share(&self, channels: &[usize], fall: f64) -> Option<f64> {
         let own = |of: &[f64; 6]| channels.iter().map(|c| of[*c]).sum::<f64>();
         let (left, rows) = (own(&self.excess), own(&self.rows));
-        // the sum of squares of n values of unit white noise has the standard deviation √(2n)
+        // the sum of the squares of n values of white noise with variance 1 has the standard deviation √(2n)
         let beyond_doubt = left > f64::max(DOUBT * (2.0 * rows).sqrt(), UNSURE * rows);
         beyond_doubt.then(|| left / (left + fall))
     }
@@ -115,14 +121,14 @@ pub fn excess(round: &Round, channels: &[bool; 6]) -> f64 {
     blocks.map(of).sum::<f64>() - rows(round, channels)
 }
 
-/// Number of rows of the regression in `channels`. It equals the expected sum of squares of the whitened noise.
+/// Number of rows of the regression in `channels`. It is the expectation of the sum of squares of the whitened noise.
 fn rows(round: &Round, channels: &[bool; 6]) -> f64 {
     let all = round.projected.rows_by_channel();
     (0..6).filter(|c| channels[*c]).map(|c| all[c]).sum()
 }
 
-/// Combinations of columns whose amplitudes the held-out check fits: each column of a linear candidate, or the whole
-/// contribution of a nonlinear candidate. An entry is the index of a column with its weight.
+/// Combinations of columns whose amplitudes are fitted by [`heldout_reduction`]: each column of a linear candidate, or the whole
+/// contribution of a nonlinear candidate. A combination is a list of column indices with weights.
 fn directions(trial: &Trial, score: &Score) -> Vec<Vec<(usize, f64)>> {
     match trial.points[score.point].contribution {
         None => score.weights.iter().map(|(c, _)| vec![(*c, 1.0)]).collect(),
@@ -130,10 +136,10 @@ fn directions(trial: &Trial, score: &Score) -> Vec<Vec<(usize, f64)>> {
     }
 }
 
-/// Whether the candidate merely replaces changes of existing coefficients.
+/// Whether the candidate with this `score` merely undoes changes of existing coefficients.
 ///
-/// Without the candidate, the data move these coefficients far from their prior and thereby explain the residual. With
-/// the candidate, the coefficients return to their prior, and the residual hardly becomes smaller.
+/// Without such a candidate, the fit moves coefficients far from their prior means and thereby explains the residual. With it,
+/// the coefficients return to their prior means, and the residual hardly becomes smaller.
 pub fn absorbs_prior_error(round: &Round, score: &Score) -> bool {
     let prior = &round.projected.prior;
     let last = round.projected.width();
@@ -142,14 +148,15 @@ pub fn absorbs_prior_error(round: &Round, score: &Score) -> bool {
     reduction > PRIOR_MISFIT.powi(2) && reduction > PRIOR_SHARE * score.fall
 }
 
-/// Correlation of the fitted contributions of two candidates after the nuisance parameters are projected out.
+/// Correlation of the fitted contributions of two candidates, after the nuisance parameters were projected out.
 pub fn correlation(round: &Round, a: &Score, b: &Score) -> f64 {
     let total = &round.projected.total;
     let of = |u: &Score, v: &Score| quadratic(&u.weights, &v.weights, total);
     of(a, b) / (of(a, a) * of(b, b)).sqrt()
 }
 
-/// Indices in `scores` of the effects that these data cannot distinguish from the effect at index `of`.
+/// Indices in `scores` of the effects that these flights cannot distinguish from the effect with index `of`. An entry of `scores`
+/// is the index of a candidate with its score.
 pub fn class(round: &Round, scores: &[(usize, Score)], of: usize) -> Vec<usize> {
     let (_, own) = &scores[of];
     (0..scores.len())
@@ -163,9 +170,8 @@ pub fn class(round: &Round, scores: &[(usize, Score)], of: usize) -> Vec<usize> 
         .collect()
 }
 
-/// Share of `count` block bootstraps in which a candidate of `class` ranks first among the candidates `open`.
-///
-/// `open` is in descending order of rank. Blocks are drawn separately for each flight.
+/// Share of `count` block bootstraps in which one of the candidates `class` ranks first. The best of the candidates `open`
+/// compete; the best candidate is first in `open`. Blocks are drawn separately for each flight.
 pub fn selected(round: &Round, open: &[usize], class: &[usize], count: usize) -> f64 {
     let seed = round.seed;
     let by_flight: Vec<Vec<usize>> = (0..round.flights.len())
@@ -198,14 +204,14 @@ pub fn selected(round: &Round, open: &[usize], class: &[usize], count: usize) ->
     wins as f64 / count.max(1) as f64
 }
 
-/// Estimates of the free coefficients of an effect from each flight alone.
+/// Estimates of the free coefficients of the candidate `trial` from each flight alone.
 ///
-/// Returns one entry for each free coefficient: its index among the coefficients of the effect, then the estimate and
-/// its standard deviation for each flight. Both are NaN for a flight without information.
+/// Returns one entry for each free coefficient: its index among the candidate's coefficients, and for each flight the estimate
+/// and its standard deviation. Both are NaN for a flight with too little information.
 ///
-/// Sensor errors are estimated again for each flight. The model's coefficients have the estimates from all flights as
-/// priors. Without these priors, noise in the regressors of a flight with little excitation would bias the coefficients
-/// toward zero (errors in variables).
+/// Sensor errors are estimated again for each flight. The priors of the model's coefficients are the estimates from all flights.
+/// Otherwise, noise in the regressors of a flight with little excitation would bias the coefficients towards zero (errors in
+/// variables).
 pub fn by_flight(round: &Round, trial: &Trial, score: &Score) -> Vec<(usize, Vec<[f64; 2]>)> {
     let free = &trial.points[score.point].free;
     let flights: Vec<Vec<[f64; 2]>> = (0..round.flights.len())
@@ -218,7 +224,8 @@ pub fn by_flight(round: &Round, trial: &Trial, score: &Score) -> Vec<(usize, Vec
     free.iter().enumerate().map(|(k, f)| (f.0, of(k))).collect()
 }
 
-/// Estimates and standard deviations of the free coefficients from one flight. `None` if they cannot be computed.
+/// Estimates and standard deviations of the free coefficients from the flight with index `flight` alone. `None` if they cannot be
+/// computed.
 fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Option<Vec<[f64; 2]>> {
     let own: Vec<usize> =
         (0..round.cells.list.len()).filter(|k| round.cells.list[*k].flight == flight).collect();
@@ -247,16 +254,15 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     let by_itself = Trial { points: vec![point], ..trial.clone() };
     let grams = p.grams();
     let found = by_itself.score(&grams, &Draw::measured(&grams))?;
-    // a residual beyond noise, for example due to another missing effect, may bias the estimate: its standard deviation
-    // is increased
+    // a residual beyond noise, for example due to another missing effect, may bias the estimate; the standard deviation is
+    // therefore increased
     let misfit = misfit(&p, &trial.channels, found.fall);
     let each: Vec<[f64; 2]> =
         indices.iter().map(|i| [found.values[*i], misfit * found.deviations[*i]]).collect();
     if contribution.is_some() {
         return Some(each);
     }
-    // noise in the regressors looks like excitation but contains no information: its part of the Gram matrix is
-    // subtracted
+    // noise in the regressors adds to the Gram matrix but contains no information; its part is therefore subtracted
     let disturbed = alone(&round.disturbed, flight, na, &columns);
     let added = less(&disturbed, &placed);
     let feint = p.others(&cells, &added, &noise.whiteners);
@@ -272,8 +278,8 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     Some(each.iter().enumerate().map(one).collect())
 }
 
-/// Root mean square of the whitened residual in `channels` after its sum of squares has been reduced by `fall`. The
-/// result is at least 1, the value for pure noise.
+/// Root mean square of the whitened residual in `channels` after a reduction of its sum of squares by `fall`. The result is at
+/// least 1, the value for pure noise.
 fn misfit(p: &Projected, channels: &[bool; 6], fall: f64) -> f64 {
     let own = |of: &[(f64, usize); 6]| (0..6).filter(|c| channels[*c]).map(|c| of[c]).collect();
     let all: Vec<Vec<(f64, usize)>> = p.by_channel.iter().map(own).collect();
@@ -282,14 +288,14 @@ fn misfit(p: &Projected, channels: &[bool; 6], fall: f64) -> f64 {
     ((square - fall) / rows.max(1) as f64).max(1.0).sqrt()
 }
 
-/// Nuisance parameters for the fit to one flight. The prior of each model coefficient is its estimate from all flights,
-/// fitted together with the effect of `score`.
+/// The nuisance parameters for the fit to one flight. The prior of each coefficient of the model is its estimate from all
+/// flights, fitted together with the effect that has this `score`.
 fn together(round: &Round, score: &Score) -> Vec<Known> {
     let p = &round.projected;
     let mut all = round.known.clone();
     for (k, known) in all.iter_mut().take(round.coefficients.len()).enumerate() {
         let given: f64 = score.weights.iter().map(|(c, w)| w * p.taken[(k, *c)]).sum();
-        // the change that the effect causes has the relative standard deviation of the effect itself, 1 / √wald
+        // the effect's relative standard deviation is 1 / √wald; the change `given` that it causes has the same
         let astray = given.powi(2) / score.wald.max(1.0);
         known.offset = p.tuned[k] - given;
         known.width = (p.covariance[(k, k)].max(0.0) + astray).sqrt().min(known.width);
@@ -297,8 +303,8 @@ fn together(round: &Round, score: &Score) -> Vec<Known> {
     all
 }
 
-/// Columns of one flight: those of the `na` nuisance parameters, then the candidate's columns `columns`, renumbered
-/// from `na`. The lists of all other flights are empty.
+/// The columns in `placed` of the flight with index `flight`: those of the `na` nuisance parameters, then the candidate's columns
+/// `columns`, renumbered from `na` on. The lists of all other flights are empty.
 fn alone(placed: &[Placed], flight: usize, na: usize, columns: &[usize]) -> Vec<Placed> {
     let own = &placed[flight];
     let mut list: Placed = own.iter().take_while(|(p, _)| *p < na).cloned().collect();
@@ -311,7 +317,7 @@ fn alone(placed: &[Placed], flight: usize, na: usize, columns: &[usize]) -> Vec<
     all
 }
 
-/// Columns of `a` minus the columns of `b` with the same indices, by flight.
+/// For each flight, the columns of `a` minus the columns of `b` with the same indices.
 fn less(a: &[Placed], b: &[Placed]) -> Vec<Placed> {
     let of = |(a, b): (&Placed, &Placed)| {
         let both = a.iter().filter_map(|(p, x)| Some((*p, x, &b.iter().find(|(q, _)| q == p)?.1)));
@@ -320,11 +326,11 @@ fn less(a: &[Placed], b: &[Placed]) -> Vec<Placed> {
     a.iter().zip(b).map(of).collect()
 }
 
-/// Whether a flight contradicts `value`, the estimate from all flights. `flights` holds the estimate and standard
-/// deviation of each flight.
+/// Whether the estimate of any flight contradicts `value`, the estimate from all flights. `flights` holds the estimate and
+/// standard deviation of each flight.
 ///
-/// An estimate contradicts `value` if it has the opposite sign by more than three standard deviations. It also
-/// contradicts if it differs by more than four standard deviations and by more than half of `value`.
+/// An estimate contradicts `value` in two cases. It has the opposite sign and is more than three standard deviations from zero,
+/// or it differs from `value` by more than four standard deviations and by more than half of `value`.
 pub fn contradict(value: f64, flights: &[[f64; 2]]) -> bool {
     flights.iter().any(|[own, sd]| {
         let other_sign = own * value < 0.0 && own.abs() > 3.0 * sd;

@@ -1,22 +1,22 @@
-//! Discretisation error of the fitted coefficients, estimated by a second fit to every other sample.
+//! Estimates the discretisation error of fitted coefficients by a second fit to every other sample.
 //!
-//! The standard deviations of a fit cover only noise. At a sampling interval of 20 or 40 ms, deflections and rates
-//! change between two samples, but the fit replaces integrals by sums over samples. The resulting error is not noise:
-//! it is the same in every flight, and its mean is not zero.
+//! The standard deviations of a fit cover only noise. At a sampling interval of 20 or 40 ms, deflections and rates change between
+//! two samples, but the fit replaces integrals by sums over samples. The resulting error is systematic: it is the same in every
+//! flight.
 
 use crate::diagnose::search::round::{Problem, Round};
 use crate::diagnose::search::settling::SETTLING;
 use greylag_logs::Sampling;
 
-/// Standard deviation of the discretisation error, as a share of the difference between the fits to half of the samples
-/// and to all samples. The share is one third if the error is proportional to the square of the sampling interval.
+/// Standard deviation of the discretisation error, as a fraction of the difference between the fits to half of the samples and to
+/// all samples. The error is one third of this difference if it is proportional to the square of the sampling interval.
 const LEFT: f64 = 1.0 / 3.0;
 
-/// Standard deviation of each coefficient of the model of `round` due to discretisation, in the order and the units of
-/// the model's coefficients.
+/// Standard deviation due to discretisation of each coefficient of the re-estimated model of `round`, in the order and the units
+/// of the coefficients.
 ///
-/// Zero if the fit to half of the samples fails. Zero also if the log holds the steps of a simulator, for which the
-/// sums are exact.
+/// It is zero if the fit to half of the samples fails. It is also zero if the log has the time steps of a simulator, for which
+/// the sums are exact.
 pub fn left_by_sums(problem: &Problem, round: &Round) -> Vec<f64> {
     let fine = round.tuned();
     let none = vec![0.0; fine.coefficients().len()];
@@ -60,7 +60,7 @@ mod tests {
 
     const STEP_S: f64 = 0.01;
 
-    /// Simulates 40 s of `model` with sinusoidal deflections and records every `every`-th step, without noise and
+    /// Simulates 40 s of flight of `model` with sinusoidal deflections, and records every `every`-th step without noise and
     /// without specific force.
     fn flown(model: &GreyBox, every: usize, sampling: Sampling) -> Reconstruction {
         let surfaces = |time: f64| Controls {
@@ -101,8 +101,8 @@ mod tests {
         }
     }
 
-    /// Error of the fitted roll damping, its standard deviation due to noise, and its standard deviation due to
-    /// discretisation.
+    /// Fits the roll damping Clp to a flight. Returns its error, its standard deviation due to noise, and the estimated standard
+    /// deviation due to discretisation.
     fn roll_damping(every: usize, sampling: Sampling) -> [f64; 3] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
         let mut model = GreyBox::load(&path).unwrap();
@@ -123,7 +123,7 @@ mod tests {
         for _ in 0..SETTLING {
             round = Round::new(&problem, round.tuned(), &[]).unwrap();
         }
-        // parameters are named after the flight, because its number changes if an earlier flight is left out
+        // a parameter of a flight has the flight's name and not its number, which changes if an earlier flight is left out
         assert!(round.known.iter().any(|known| known.name == "gyro_bias_p of flight f"));
         let k = round.coefficients.iter().position(|of| *of == place).unwrap();
         let noise = round.projected.covariance[(k, k)].sqrt();

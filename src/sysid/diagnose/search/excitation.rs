@@ -8,8 +8,8 @@ use greylag_logs::rudder::MOVES_RAD;
 /// Smallest total duration of the flights, s.
 const LEAST_S: f64 = 10.0;
 
-/// Requirement on the motion of a variable: its name, a function that reads it, smallest standard deviation, factor
-/// from SI to the unit of this deviation, this unit, and a manoeuvre that excites the variable.
+/// Requirement on the motion of a variable: its name, a function that reads it, the smallest standard deviation, the factor
+/// from SI to the unit of this deviation, the unit, and a manoeuvre that excites the variable.
 type Need = (&'static str, fn(&Instant) -> f64, f64, f64, &'static str, &'static str);
 
 const NEEDS: [Need; 4] = [
@@ -22,7 +22,8 @@ const NEEDS: [Need; 4] = [
 /// Returns a note for each variable that moves too little for a diagnosis.
 ///
 /// # Errors
-/// The flights are shorter than 10 s, or at least three of aileron, elevator, throttle and angle of attack hardly move.
+/// If the flights are shorter than 10 s in total, or if at least three of aileron, elevator, throttle and angle of attack move
+/// too little.
 pub fn check(flights: &[Prepared]) -> Result<Vec<String>, DiagnoseError> {
     let seconds = flights.iter().fold(0.0, |sum, f| sum + f.sample_count() as f64 * f.dt);
     if seconds < LEAST_S {
@@ -45,8 +46,7 @@ pub fn check(flights: &[Prepared]) -> Result<Vec<String>, DiagnoseError> {
         .collect())
 }
 
-/// Describes the small motion of a variable in words. If the variable is constant, the log probably has the wrong
-/// channel.
+/// Describes the small motion of a variable in words. A constant variable probably comes from the wrong channel of the log.
 fn small(name: &str, moved: f64, unit: &str) -> String {
     match moved == 0.0 {
         true => format!(

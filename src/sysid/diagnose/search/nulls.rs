@@ -1,4 +1,6 @@
 //! Critical value of the evidence, from bootstrap draws under the null hypothesis that no effect is missing.
+//!
+//! The evidence is the test statistic of a candidate effect. A block is a section of a flight with its own random sign.
 
 use nalgebra::DVector;
 use rand::RngExt;
@@ -12,9 +14,8 @@ use greylag_num::stream::stream;
 /// Number of the random stream for the bootstrap draws.
 const NULLS: u64 = 80;
 
-/// Draw number `k` under the null hypothesis (wild block bootstrap): products of the candidates' regressors with pure
-/// noise. The noise of each block has a random sign that is common to all channels. Random errors of the prior means
-/// are added.
+/// Draw number `k` under the null hypothesis (wild block bootstrap): products of the candidates' regressors with noise alone.
+/// The random sign of a block is common to all channels. Random errors of the prior means are added.
 pub fn draw(p: &Projected, seed: u64, k: usize) -> Draw {
     let mut random = stream(seed, &[NULLS, k as u64]);
     let mut total = DVector::zeros(p.width());
@@ -71,8 +72,8 @@ mod tests {
 
     #[test]
     fn the_threshold_of_known_maxima() {
-        // the maximum of 20 draws E = −2 ln U (chi-square, two degrees of freedom):
-        // its 99 % quantile is −2 ln(1 − 0.99^(1/20))
+        // The largest of 20 values E = −2 ln U (chi-square with two degrees of freedom) has the 99 % quantile −2 ln(1 −
+        // 0.99^(1/20)).
         let exact = -2.0 * (1.0 - 0.99_f64.powf(1.0 / 20.0)).ln();
         let mut random = stream(5, &[]);
         let mut largest =

@@ -1,4 +1,5 @@
-//! Part of the residual that a flexible model without physics could remove, cross-validated by flight.
+//! Part of the residual that a flexible model without physics (a ridge regression on many features) could remove,
+//! cross-validated by flight.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rand::RngExt;
@@ -11,22 +12,22 @@ use greylag_num::stream::stream;
 
 /// Ridge parameters that are tried, relative to the mean squared norm of a feature.
 const RIDGES: [f64; 4] = [1e-3, 1e-2, 1e-1, 1.0];
-/// Number of the random stream for the draws of noise.
+/// Id of the random stream for the draws of noise.
 const NULLS: u64 = 83;
 /// Number of folds into which a single flight is divided. With several flights, each flight is a fold.
 const FOLDS: usize = 3;
 
-/// Reduction of the residual by the flexible model, by channel and in total.
+/// Reduction of the residual by the flexible model, for each channel and in total.
 #[derive(Clone, Debug)]
 pub struct Remainder {
-    /// Reduction of the whitened residual sum of squares on flights to which the flexible model was not fitted, by
-    /// channel.
+    /// Reduction of the whitened residual sum of squares for each channel, on flights to which the flexible model was not
+    /// fitted.
     pub removable: [f64; 6],
-    /// Critical value of the reduction for pure noise, by channel.
+    /// Critical value of the reduction for each channel, from pure noise.
     pub threshold: [f64; 6],
     /// Sum of the reductions over all channels.
     pub total: f64,
-    /// Critical value of the sum for pure noise.
+    /// Critical value of this sum, from pure noise.
     pub total_threshold: f64,
 }
 
@@ -44,8 +45,8 @@ struct Fold {
     others: Vec<Cholesky<f64, Dyn>>,
 }
 
-/// Computes the part of the residual of `round` that a flexible model could remove. The critical values have the
-/// significance level `level` and come from `count` draws of noise.
+/// Computes the part of the residual of `round` that a flexible model could remove. The critical values come from `count` draws
+/// of noise. The significance level is `level` for the total and `level` / 6 for each channel.
 pub fn remainder(round: &Round, count: usize, level: f64) -> Remainder {
     let channels: Vec<Option<Channel>> =
         (0..6).into_par_iter().map(|c| channel(round, c)).collect();
@@ -110,13 +111,14 @@ fn channel(round: &Round, channel: usize) -> Option<Channel> {
     Some(Channel { folds })
 }
 
-/// Projected features, noise and residual of one channel of one flight.
+/// Features, noise and residual of one channel of one flight.
 type Projected = (DMatrix<f64>, DVector<f64>, DVector<f64>);
 
-/// Whitened features of unit RMS, noise and residual of each cell, with the nuisance parameters projected out.
+/// Returns whitened features of unit RMS, noise and residual of each of `cells`. A cell has the data of one channel of one
+/// flight. The nuisance parameters are projected out.
 ///
-/// The projection is an ordinary least-squares fit without the errors-in-variables correction. The flexible model would
-/// otherwise fit the bias that the correction leaves in the residual.
+/// The nuisance parameters are fitted by ordinary least squares, without the errors-in-variables correction. That correction
+/// leaves a bias in the residual, which the flexible model would fit.
 fn projected_features(round: &Round, cells: &[usize]) -> Option<Vec<Projected>> {
     let na = round.known.len();
     let mut all = Vec::new();
@@ -168,8 +170,8 @@ fn projected_features(round: &Round, cells: &[usize]) -> Option<Vec<Projected>> 
 }
 
 impl Channel {
-    /// Reduction of the sum of squares of held-out folds with the best ridge parameter, at least zero. The target is
-    /// the residual. If `signs` is given, the target is the noise, multiplied by the sign of each block.
+    /// Reduction of the target's sum of squares, summed over the held-out folds, with the best ridge parameter; at least zero.
+    /// The target is the residual. If `signs` is given, the target is the noise, multiplied by the sign of each block.
     fn gain(&self, signs: Option<&[f64]>) -> f64 {
         let targets: Vec<DVector<f64>> = self
             .folds

@@ -1,4 +1,7 @@
-//! Ranking of the candidate effects, and re-estimation of the model after a candidate has been added.
+//! Ranks the candidate effects, and re-estimates the model after a candidate has been added.
+//!
+//! The evidence of a candidate is the smaller of its penalised likelihood gain and its Wald statistic. A round of the search
+//! ranks all candidates once.
 
 use crate::diagnose::options::Options;
 use crate::diagnose::regression::rank::Score;
@@ -27,7 +30,7 @@ pub struct Ranked {
 }
 
 /// Ranks the candidates of `round`. The regressors of mass and inertia contain accelerations that the model predicts.
-/// If these are too inaccurate, the ranking is repeated with the accelerations of a better model.
+/// If these accelerations are too inaccurate, the ranking is repeated with the accelerations of a better model.
 pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
     let rank = |mut round: Round| {
         let scores = round.rank();
@@ -46,9 +49,9 @@ pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
 /// obtained from the model of the round: the best-ranked change of mass or inertia is added, and all coefficients are
 /// re-estimated.
 ///
-/// A large inertia error of the model makes these regressors wrong. The estimates then differ between flights and are
-/// all too small. `None` if no change of mass or inertia exceeds the critical value, if the re-estimation changes its
-/// first coefficient by at most `ASTRAY`, or if a model cannot be linearised.
+/// A large inertia error of the model makes these regressors wrong. The estimates of mass or inertia then differ between
+/// flights and are all too small. `None` if no change of mass or inertia exceeds the critical value, if the re-estimation
+/// changes its first coefficient by at most the fraction `ASTRAY`, or if a model cannot be linearised.
 fn accelerated(problem: &Problem, ranked: &Ranked) -> Option<Round> {
     let Ranked { round, scores, threshold, .. } = ranked;
     let of_body = |trial: usize, score: &Score| {
@@ -74,8 +77,8 @@ fn accelerated(problem: &Problem, ranked: &Ranked) -> Option<Round> {
     Round::beside(problem, round.model.clone(), &round.entries, beside)
 }
 
-/// Re-estimates all coefficients of `model` in `passes` passes with the noise of `round`. Returns the model, and its
-/// whitened residual sum of squares before the last pass. `None` if the model cannot be linearised.
+/// Re-estimates all coefficients of `model` in `passes` passes with the noise of `round`. Returns the re-estimated model, and
+/// the whitened residual sum of squares before the last pass. `None` if the model cannot be linearised.
 pub fn settled(
     problem: &Problem,
     round: &Round,

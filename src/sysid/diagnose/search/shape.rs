@@ -1,9 +1,10 @@
-//! Lack-of-fit test: regression of the residual on products of states and deflections. If these explain a residual that
-//! remains after an effect was added, the formula of the effect differs from the true one.
+//! Lack-of-fit test: regression of the residual on products of states and deflections (the terms). If an effect was added and
+//! the terms still explain part of the residual, the formula of the effect differs from the true one.
 //!
-//! The flexible model of [`remainder`](super::remainder) must generalise to other flights and detects only large
-//! errors. This test fits a few terms, similar to those of aerodynamic tables, to the same flights. It compares the
-//! reduction of the residual with the reduction that the terms achieve on pure noise.
+//! The flexible model of [`remainder`](super::remainder) must generalise to other flights and detects only large errors. This
+//! test fits a few terms, similar to those of aerodynamic tables, to the same flights. It compares their reduction of the
+//! residual sum of squares with their reduction of pure noise. The residual is whitened: noise has a mean square of 1 per row
+//! of the regression.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -26,15 +27,13 @@ const PRODUCTS: usize = NAMES.len() * (NAMES.len() + 1) / 2;
 /// Names of the second derivatives of the deflections. A first-order lag and a pure delay have the same first-order
 /// effect and differ in these derivatives.
 const BENT: [&str; 2] = ["δa″", "δe″"];
-/// Number of terms in each channel.
+/// Number of terms per channel.
 const TERMS: usize = PRODUCTS + BENT.len();
 /// Ridge parameter for nearly collinear terms, relative to a term's squared norm.
 const RIDGE: f64 = 1e-4;
-/// The reduction by the terms is significant if it exceeds the mean reduction of noise by this number of standard
-/// deviations.
+/// The reduction by the terms is significant if it exceeds their mean reduction of noise by this number of standard deviations.
 const DOUBT: f64 = 4.0;
-/// Reduction of the residual sum of squares per row that remaining errors of sensors and path may cause. Pure noise has
-/// a mean square of 1 per row.
+/// Reduction of the residual sum of squares per row that remaining errors of sensors and path may cause.
 const UNSURE: f64 = 0.1;
 /// Reduction of the residual sum of squares per row above which the terms alone indicate a missing effect. Without a
 /// missing effect, it was at most 0.13.
@@ -43,7 +42,7 @@ const ALARM: f64 = 0.15;
 /// they reached at most 25.
 const BENDING: f64 = 30.0;
 
-/// Reduction of the whitened residual sum of squares by the terms, by channel.
+/// Reduction of the residual sum of squares by the terms, for each channel.
 #[derive(Clone, Debug)]
 pub struct Shape {
     channels: Vec<Taken>,
@@ -57,22 +56,22 @@ struct Taken {
     /// Standard deviation of the reduction for pure noise.
     doubt: f64,
     rows: f64,
-    /// Index of the term that alone reduces the residual most.
+    /// Index of the single term that reduces the residual sum of squares most.
     most: usize,
-    /// Reduction by the second derivatives alone.
+    /// Reduction by the second derivatives of the deflections alone.
     bent: f64,
 }
 
 impl Shape {
-    /// Name of the term that explains most of the residual of `channel`. `None` unless the residual indicates a missing
-    /// effect.
+    /// Name of the term that alone explains most of the residual of `channel`. `None` unless the terms' reduction indicates a
+    /// missing effect.
     pub fn term(&self, channel: usize) -> Option<String> {
         self.left_in(&[channel], ALARM).map(|_| name(self.channels[channel].most))
     }
 
-    /// Compares the terms with effects that reduce the residual sum of squares in `channels` by `fall`. Returns the
-    /// terms' share of both reductions together, and the name of the strongest term. `None` if the reduction by the
-    /// terms is not significant.
+    /// Compares the terms with effects that reduce the residual sum of squares in `channels` by `fall`. Returns the terms'
+    /// reduction as a fraction of the sum of both reductions, and the name of the strongest term. `None` if the terms'
+    /// reduction is not significant.
     pub fn beside(&self, channels: &[usize], fall: f64) -> Option<(f64, String)> {
         let left = self.left_in(channels, UNSURE)?;
         let own = channels.iter().map(|c| &self.channels[*c]);
@@ -80,9 +79,9 @@ impl Shape {
         Some((left / (left + fall), name(most)))
     }
 
-    /// Compares the second derivatives of the deflections with an effect that reduces the residual sum of squares by
-    /// `fall`. Returns the derivatives' share of both reductions together, over all channels. A channel counts only if
-    /// its reduction exceeds that of correct models.
+    /// Compares the second derivatives of the deflections with an effect that reduces the residual sum of squares by `fall`.
+    /// Returns the derivatives' reduction over all channels as a fraction of the sum of both reductions. A channel counts only
+    /// if its reduction exceeds that of correct models.
     pub fn bends_beside(&self, fall: f64) -> f64 {
         let bent = self.channels.iter().map(|c| c.bent).filter(|bent| *bent > BENDING).sum::<f64>();
         bent / (bent + fall).max(f64::MIN_POSITIVE)
@@ -99,8 +98,8 @@ impl Shape {
     }
 }
 
-/// Computes the reduction of the residual of `round` by the terms and compares it with `count` draws of noise. The
-/// round must have no candidates. `None` if the terms cannot be fitted.
+/// Computes the reduction of the residual of `round` by the terms and compares it with that of `count` draws of noise. A round
+/// is a linearisation of the model over the flights. It must have no candidates here. `None` if the terms cannot be fitted.
 pub fn shape(round: &Round, count: usize) -> Option<Shape> {
     let na = round.known.len();
     let last = na + CHANNELS * TERMS;
@@ -128,8 +127,8 @@ pub fn shape(round: &Round, count: usize) -> Option<Shape> {
     Some(Shape { channels: (0..CHANNELS).map(of).collect::<Option<_>>()? })
 }
 
-/// Reduction by the terms of one channel. `gram` is their Gram matrix. `measured` holds their products with the
-/// residual, `draws` their products with draws of noise. `None` if the Gram matrix is singular.
+/// Reduction by the terms of one channel. `gram` is their Gram matrix, `measured` are their products with the residual, `draws`
+/// their products with draws of noise. `None` if the Gram matrix is singular.
 fn taken(
     gram: &DMatrix<f64>,
     measured: &DVector<f64>,
@@ -156,14 +155,13 @@ fn taken(
     })
 }
 
-/// Regressors of the terms for `flight`, channel after channel. Each term is multiplied by dynamic pressure times wing
-/// area (N).
+/// Regressors of the terms for `flight`, channel after channel. Each term is multiplied by dynamic pressure times wing area, N.
 fn terms(model: &GreyBox, flight: &Ready, spread: &[[f64; 2]; NAMES.len()]) -> Vec<Column> {
     let sides = gather(&flight.acting, Integrator::Jsbsim, TERMS, |place, add| {
         let z = standard(variables(&flight.acting, place.segment, place.index), spread);
         let pressure = model.air(&place.at.state, place.at.altitude).q_s;
         let bends = bends(&flight.acting, place.segment, place.index);
-        // forces are averaged over samples, moments over steps: one column for forces, one for moments
+        // forces are averaged over samples, moments over steps: all forces share one column, all moments another
         for side in [0, CHANNELS / 2] {
             for (k, (i, j)) in pairs().enumerate() {
                 add(k, side, pressure * z[i] * z[j]);

@@ -1,5 +1,6 @@
-//! Forward selection: adds the candidate effect with the most evidence to the model and repeats the search until no
-//! candidate passes the checks.
+//! Forward selection: adds the candidate effect with the most evidence to the model if it passes the checks, and repeats the
+//! search with the new model until no candidate passes. Candidates that fail a check are refused. A round is one such search,
+//! with the model linearised over the flights.
 
 mod examine;
 mod found;
@@ -27,23 +28,23 @@ use examine::examine;
 use greylag_model::{GreyBox, RUDDER};
 use run_off::run_off;
 
-/// Estimated share of the work that is done after the first ranking of the candidates.
+/// Fraction of the progress bar that is reached after the first ranking of the candidates.
 const RANKED: f64 = 0.3;
 /// Largest number of effects added to the model.
 const MOST: usize = 6;
-/// Largest number of passes in which all coefficients are re-estimated after an effect has been added. If two
-/// coefficients multiply each other (a saturation limit and an effectiveness), the linearised estimates converge slowly
-/// and need more passes than [`SETTLING`].
+/// Largest number of passes in which all coefficients are re-estimated after an effect has been added. The linearised estimates
+/// converge slowly, and need more passes than [`SETTLING`], if two coefficients multiply each other (for example a saturation
+/// limit and an effectiveness).
 const MOST_SETTLING: usize = 12;
 /// Convergence tolerance of the re-estimation: largest change of a coefficient in one pass, in its standard deviations.
 const STEP_TOLERANCE: f64 = 0.2;
-/// Largest number of refused candidates that are set aside; the next refusal ends the search.
+/// Largest number of refused candidates that are set aside while the search continues. The next refusal ends the search.
 const MOST_ASIDE: usize = 4;
 
 /// Searches for the effects that `model` lacks, and tests each one before it is added.
 ///
 /// # Errors
-/// The model cannot be evaluated over the flights, or `progress` cancelled.
+/// If the model cannot be evaluated over the flights, or `progress` cancelled.
 pub fn search(
     problem: &Problem,
     model: &GreyBox,
@@ -134,8 +135,8 @@ fn select(
     Ok(aside)
 }
 
-/// Keeps the last record of each effect in `refused`. A candidate that was set aside is ranked again after another
-/// effect has been added, and may be refused again.
+/// Keeps only the last record of each effect in `refused`. A candidate that was set aside is ranked again after another effect
+/// has been added, and may be refused again.
 fn latest(refused: Vec<Selected>) -> Vec<Selected> {
     let mut kept: Vec<Selected> = Vec::new();
     for one in refused {
@@ -145,7 +146,7 @@ fn latest(refused: Vec<Selected>) -> Vec<Selected> {
     kept
 }
 
-/// Summary of the first ranking for progress reports.
+/// Summary of the first ranking, for progress reports.
 fn first_look(round: &Round, scores: &[(usize, Score)], threshold: f64) -> Vec<FirstLook> {
     let of = |(trial, score): &(usize, Score)| FirstLook {
         id: round.trials[*trial].id,
@@ -170,7 +171,7 @@ fn without(given: &GreyBox, current: &GreyBox, id: &str) -> GreyBox {
         let _ = model.join(effect, &own(effect));
     }
     for c in current.coefficients().iter().filter(|c| {
-        // coefficients that the removed effect had replaced keep the given model's values
+        // coefficients that the removed effect had replaced keep the values of the given model
         current.replaced(&c.name) != Some(id)
     }) {
         model.set_coefficient(&c.name, c.value);
@@ -179,9 +180,9 @@ fn without(given: &GreyBox, current: &GreyBox, id: &str) -> GreyBox {
 }
 
 impl Found {
-    /// Adds the effect selected last to the model and ranks the remaining candidates. An earlier effect that becomes
-    /// insignificant is removed. Returns `false`, which ends the search, if the effect cannot be added or if the model
-    /// with it cannot be linearised.
+    /// Adds the effect that was selected last to the model and ranks the remaining candidates. If an earlier effect becomes
+    /// insignificant, it is removed. Returns `false`, which ends the search, if the effect cannot be added or if the model with
+    /// it cannot be linearised.
     fn join(
         &mut self,
         problem: &Problem,
@@ -216,9 +217,9 @@ impl Found {
         Ok(true)
     }
 
-    /// Re-estimates the coefficients of `model`, which contains the effect selected last, until convergence or for
-    /// `MOST_SETTLING` passes. If an earlier effect becomes insignificant, it is removed, and the passes end. Returns a
-    /// round without candidates; `None` if the model cannot be linearised.
+    /// Re-estimates the coefficients of `model`, which contains the effect that was selected last, until convergence or for at
+    /// most `MOST_SETTLING` passes. If an earlier effect becomes insignificant, it is removed, and the passes end. Returns a
+    /// round of the resulting model, without candidates; `None` if the model cannot be linearised.
     fn settle(
         &mut self,
         problem: &Problem,
@@ -247,8 +248,8 @@ impl Found {
         Ok(Round::new(problem, model, &[]))
     }
 
-    /// Estimated share of the work that is done, 0 to 1. The number of effects is not known in advance: each selected
-    /// effect halves the share that is left.
+    /// Estimated fraction of the work that is done, 0 to 1. The number of effects is not known in advance: each selected effect
+    /// halves the fraction that is left.
     fn fraction(&self) -> f64 {
         let left = 0.5_f64.powi(self.selected.len() as i32);
         RANKED + (0.9 - RANKED) * (1.0 - left)

@@ -1,4 +1,5 @@
-//! Explained and unexplained shares of each channel's variance beyond noise.
+//! Explained and unexplained fractions of the variance of each channel (component of force or moment). The fractions are
+//! relative to the variance beyond noise, which is the variance less that due to sensor noise.
 
 use crate::compare::ChannelId;
 use crate::diagnose::regression::gather::Column;
@@ -13,7 +14,8 @@ struct Measured {
     noise: f64,
 }
 
-/// Measured variances of every channel in the flights of `first`; `None` for a channel that is not measured.
+/// Variances of every channel in the flights of `first`, the first round of the search. `None` for a channel that is not
+/// measured.
 fn measured(first: &Round) -> [Option<Measured>; CHANNELS] {
     let series: Vec<Vec<Series>> =
         first.flights.iter().map(|f| windows::channels(&first.model, &f.measured)).collect();
@@ -42,16 +44,16 @@ fn mean_square(residual: &[Column], channel: usize) -> f64 {
     mean(&finite.map(|x| x * x).collect::<Vec<f64>>())
 }
 
-/// Excess of the mean square `left` over the noise variance `noise`, as a share of `variance`; at least 0. NaN if
+/// Excess of the mean square `left` over the noise variance `noise`, as a fraction of `variance`; at least 0. NaN if
 /// `left` is NaN (`f64::max` would return 0).
 fn share(left: f64, noise: f64, variance: f64) -> f64 {
     let share = (left - noise) / variance;
     if share < 0.0 { 0.0 } else { share }
 }
 
-/// Share of each channel's variance beyond noise that remains in `residual`, which has one entry for each flight. The
-/// variance of the noise is computed with the model of `first`. NaN if the flights do not measure the channel or the
-/// model predicts no number in it.
+/// Fraction of each channel's variance beyond noise that remains in `residual`, which has one entry for each flight. The
+/// variance of the noise is computed with the model of `first`. NaN if the flights do not measure the channel, or if the
+/// model predicts only NaN in it.
 pub fn unexplained(first: &Round, residual: &[Column]) -> [f64; CHANNELS] {
     let measured = measured(first);
     std::array::from_fn(|k| match &measured[k] {
@@ -60,8 +62,8 @@ pub fn unexplained(first: &Round, residual: &[Column]) -> [f64; CHANNELS] {
     })
 }
 
-/// Decrease of the mean square residual from `before` to `after`, as a share of each channel's variance beyond noise.
-/// It is negative if the residual increases, and 0 if the flights do not measure the channel.
+/// Decrease of the mean square residual from `before` to `after`, as a fraction of each channel's variance beyond noise.
+/// The decrease is negative if the residual increases, and 0 if the flights do not measure the channel.
 pub fn explained(first: &Round, before: &[Column], after: &[Column]) -> [f64; CHANNELS] {
     let measured = measured(first);
     std::array::from_fn(|k| match &measured[k] {

@@ -1,4 +1,7 @@
-//! Equations of a stretch along the present path: its measurements and its kinematic steps.
+//! Equations of one stretch of a log in the flight-path reconstruction, linearised at the present path.
+//!
+//! The unknowns are the path (attitude, velocity and gust at each instant) and constants such as sensor errors and wind. The
+//! equations compare the path with the measurements, and each step of the path with gyros and accelerometers.
 
 use nalgebra::Vector3;
 
@@ -11,12 +14,12 @@ use crate::flight_path::measurement::{self, Others, Reading};
 use crate::flight_path::nuisance::Values;
 use crate::flight_path::path::{CHANNELS, Path};
 
-/// Residuals of kinematic steps are down-weighted beyond this multiple of the bound for measurements. At a launch, an
-/// impact or an alignment of the log's estimator, the logged path moves more than gyros and accelerometers measure.
+/// Residuals of kinematic steps are down-weighted beyond this multiple of the bound for measurements. At a launch, an impact
+/// or an alignment of the autopilot's attitude estimator, the logged path moves more than gyros and accelerometers measure.
 pub const PROCESS: f64 = 1.5;
 
-/// Equations of a stretch along the present path, with `N` unknowns for each instant. `M` columns belong to constants that
-/// act at instants, `D` columns to constants that act between instants.
+/// Equations of a stretch along the present path, with `N` unknowns for each instant. `M` is the number of columns for
+/// constants that act at instants, `D` for constants that act between instants. Both numbers include the right-hand side.
 pub struct Along<'a, const N: usize, const M: usize, const D: usize> {
     problem: &'a Problem<'a>,
     path: &'a Path,
@@ -27,7 +30,7 @@ pub struct Along<'a, const N: usize, const M: usize, const D: usize> {
     /// Gust at the first instant of the path; `gusts` is the standard deviation of gusts. Both in m/s.
     pub first: Vector3<f64>,
     gusts: f64,
-    /// Standard deviations of the measured channels; `sd` are those of the kinematic steps.
+    /// Standard deviations of the measured channels. `sd` holds those of the residuals of a kinematic step.
     pub spread: [f64; CHANNELS],
     pub sd: [f64; N],
     bound: f64,
@@ -108,8 +111,8 @@ pub fn step_deviations<const N: usize>(levels: &Levels, step: f64) -> [f64; N] {
     })
 }
 
-/// Prior of the first instant. Its standard deviations of 10 rad and 100 m/s hardly constrain the motion. The gust has the
-/// standard deviation `level`.
+/// Adds the prior of the first instant. Its standard deviations of 10 rad and 100 m/s hardly constrain the motion. The gust
+/// has the standard deviation `level`.
 fn start<const N: usize, const W: usize>(
     gust: &Vector3<f64>,
     level: f64,
@@ -129,8 +132,8 @@ fn start<const N: usize, const W: usize>(
     }
 }
 
-/// Equations of a kinematic step whose rows have the standard deviations `sd`. A residual beyond `bound` standard
-/// deviations is down-weighted.
+/// Normal equations of a kinematic step. The rows of the step have the standard deviations `sd`. A residual beyond `bound`
+/// standard deviations is down-weighted.
 pub fn weigh<const N: usize, const W: usize, const D: usize>(
     mut step: Step<N, D>,
     sd: &[f64; N],

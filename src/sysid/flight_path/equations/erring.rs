@@ -1,5 +1,8 @@
-//! Simulated errors of the estimated path due to random sensor noise, and changes of the constants due to given residuals of
-//! the air-data sensors.
+//! Simulated errors of the reconstructed path due to random sensor noise, and changes of the constants due to given residuals
+//! of the air-data sensors.
+//!
+//! The path is the sequence of attitude, airspeed and flow angles of a track (a section of the log without gaps). The constants
+//! are sensor errors and wind.
 
 use nalgebra::{SVector, Vector3};
 use rand_distr::{Distribution, StandardNormal};
@@ -16,7 +19,7 @@ use crate::flight_path::path::Path;
 use greylag_logs::Sampling;
 use greylag_num::stream::Stream;
 
-/// Estimated paths plus a simulated error of the same distribution as the error of the estimate.
+/// Reconstructed paths plus a simulated error with the distribution of the reconstruction error.
 #[derive(Clone, Debug)]
 pub struct Erring {
     /// Path of each track.
@@ -26,8 +29,8 @@ pub struct Erring {
 }
 
 impl Problem<'_> {
-    /// Changes of the constants that [`calm`](Self::calm) would estimate if the air-data sensors had the residuals
-    /// `others`, indexed by track and instant. `None` if the equations are singular.
+    /// Changes of the constants that [`calm`](Self::calm) would estimate if the air-data sensors had the residuals `others`,
+    /// given for each track and instant. `None` if the equations are singular.
     pub fn moved_by(
         &self,
         found: &Found,
@@ -47,7 +50,7 @@ impl Problem<'_> {
         }))
     }
 
-    /// The estimated paths plus the error due to one random draw of the noise of every sensor. The constants are held.
+    /// The reconstructed paths plus the error that one random draw of the noise of every sensor causes. The constants are held.
     /// `None` if the equations are singular.
     pub fn erring(&self, found: &Found, random: &mut Stream) -> Option<Erring> {
         let mut erring = Erring { paths: found.paths.clone(), gyro: Vec::new() };
@@ -90,10 +93,10 @@ impl Problem<'_> {
     }
 }
 
-/// Equations of a path's error due to one draw of the noise of every sensor.
+/// Equations of the error of a path that one draw of the noise of every sensor causes.
 struct Drawn<'a, const N: usize> {
     along: Along<'a, N, 1, 1>,
-    /// Standard normal random numbers, one for each row of each kinematic step.
+    /// Standard normal random numbers: one for each noise input of each kinematic step from an instant to the next.
     noise: Vec<[f64; N]>,
     sampling: Sampling,
 }

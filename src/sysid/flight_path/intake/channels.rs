@@ -1,4 +1,4 @@
-//! Channels of a log with their kinds of interpolation, and the check of the required channels.
+//! Channels (time series) of a log with their kinds of interpolation, and the check of the required channels.
 
 use super::{Periods, Present};
 use crate::flight_path::ReconstructError;

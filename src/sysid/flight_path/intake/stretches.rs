@@ -1,4 +1,4 @@
-//! Stretches of a log in which the aircraft flies and no gap occurs, and their sampling interval.
+//! Finds the stretches of a log in which the aircraft flies and no gap occurs, and the time step for them.
 
 use super::Present;
 use crate::flight_path::{Options, ReconstructError};
@@ -7,12 +7,12 @@ use greylag_num::statistics::quantile;
 
 /// The time between two rows is a gap if it exceeds both this number of median periods and `Options::gap_s`.
 const GAP_PERIODS: f64 = 2.5;
-/// Largest median period used for the detection of gaps, s: below 5 Hz the motion between rows is not known.
+/// Largest median period that is used to detect gaps, s. At a row rate below 5 Hz, the motion between rows is not known.
 const SLOWEST_PERIOD: f64 = 0.2;
 /// Length of the window around a row over which the airspeed is averaged to decide whether the aircraft flies, s.
 const AIRBORNE_WINDOW: f64 = 1.0;
 
-/// Times of the rows of each stretch, s. Fails if the airspeed never reaches `Options::airspeed_min_mps`.
+/// The times (s) of the usable rows of each stretch. Fails if the airspeed never reaches `Options::airspeed_min_mps`.
 pub(super) fn stretches(
     flight: &Flight,
     has: &Present,
@@ -38,7 +38,7 @@ pub(super) fn stretches(
     Ok(stretches)
 }
 
-/// Longest time between rows that does not count as a gap, s. It is longer for a log with a low sample rate.
+/// Longest time between two rows that does not count as a gap, s. It is longer in a log with a low row rate.
 pub(super) fn gap(flight: &Flight, options: &Options) -> f64 {
     let times: Vec<f64> = flight.samples.iter().map(|s| s.time_s).collect();
     let periods: Vec<f64> =
@@ -47,7 +47,7 @@ pub(super) fn gap(flight: &Flight, options: &Options) -> f64 {
     1.000_001 * options.gap_s.max(GAP_PERIODS * period.min(SLOWEST_PERIOD))
 }
 
-/// Function that decides from the mean airspeed around a time (s) whether the aircraft flies.
+/// Returns a function that decides whether the aircraft flies at a time (s), from the mean airspeed around that time.
 fn airborne(flight: &Flight, options: &Options) -> Result<impl Fn(f64) -> bool, ReconstructError> {
     let rows = flight.samples.iter().map(|s| (s.time_s, s.airspeed_mps));
     let (times, speeds): (Vec<f64>, Vec<f64>) =
@@ -75,6 +75,6 @@ pub(super) fn step(stretches: &[Vec<f64>], options: &Options) -> f64 {
     let periods: Vec<f64> =
         stretches.iter().flat_map(|t| t.windows(2).map(|w| w[1] - w[0])).collect();
     let median = quantile(&periods, 0.5);
-    // without the factor 1.02, a clock with few digits could give a step of 0.010001 s
+    // the factor 1.02 ignores small deviations of the log's clock, which could give a step such as 0.010001 s
     if median.is_finite() && median > 1.02 * options.step_s { median } else { options.step_s }
 }

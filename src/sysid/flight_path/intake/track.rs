@@ -1,5 +1,5 @@
-//! Resampling of a stretch to uniform time steps. Measurements may be missing, commands are held, deflections are always
-//! defined.
+//! Resampling of a stretch, a part of a log without gaps, to uniform time steps. A measurement without a recorded value
+//! nearby is NaN. A command holds until the next one. Deflections have a value at every step.
 
 use super::channels::Channels;
 use super::{Present, Track};
@@ -9,8 +9,8 @@ use greylag_physics::actuators::Actuators;
 use greylag_physics::atmosphere::{Atmosphere, Density};
 use greylag_physics::{Command, Controls};
 
-/// Interval over which the altitude is differenced to obtain the climb rate, s. The integrated heading is stored once in
-/// each such interval.
+/// Interval over which the altitude is differenced to obtain the climb rate, s. It is also the interval at which an
+/// integrated heading is stored.
 const CLIMB_WINDOW: f64 = 1.0;
 
 pub(super) fn track(
@@ -67,8 +67,8 @@ pub(super) fn track(
     track
 }
 
-/// Computes the vertical velocity (m/s, down) from the altitude once every [`CLIMB_WINDOW`]. The intervals do not overlap:
-/// no part of the altitude is used twice.
+/// Computes the vertical velocity (m/s, down) from the altitude once every [`CLIMB_WINDOW`]. The intervals do not overlap, so
+/// that the errors of these measurements are independent.
 fn climb(track: &mut Track, step: f64) {
     let half = (CLIMB_WINDOW / step / 2.0).round().max(1.0) as usize;
     let mut k = half;
@@ -80,7 +80,7 @@ fn climb(track: &mut Track, step: f64) {
 }
 
 /// Integrates the heading from the gyros, ψ̇ = (q sin φ + r cos φ) / cos θ, and stores it as a measurement once every
-/// [`CLIMB_WINDOW`]. Without a measured heading, the heading of the path would be undetermined.
+/// [`CLIMB_WINDOW`]. It is used if the log has neither yaw nor velocity, because the heading would then be undetermined.
 fn heading(track: &mut Track, step: f64) {
     let every = (CLIMB_WINDOW / step).round().max(1.0) as usize;
     let (mut yaw, mut last) = (0.0, [0.0; 2]);
@@ -104,8 +104,8 @@ fn command(channels: &Channels, t: f64) -> Option<Command> {
     command.is_finite().then_some(command)
 }
 
-/// Deflections (rad) and throttle position (0..1) at `times` (s): the logged positions, or the commands passed through the
-/// actuator model.
+/// Deflections (rad) and throttle position (0..1) at `times` (s). They are the logged positions or, if there are none, the
+/// commands passed through the actuator model.
 pub(super) fn controls(channels: &Channels, times: &[f64], options: &Options) -> Vec<Controls> {
     let f = &options.actuators;
     let sent = |t: f64| {

@@ -1,4 +1,4 @@
-//! Evaluation of an expression over all samples.
+//! Evaluates an expression at all samples of the flights.
 
 use greylag_physics::formula::Variable;
 use greylag_physics::formula::expression::{Expression, Function, Node};
@@ -6,7 +6,8 @@ use greylag_physics::formula::expression::{Expression, Function, Node};
 /// Values of the expression `of` at `count` samples. `constants` are the values of its parameters. `variable` returns
 /// the values of a variable at all samples.
 ///
-/// NaN if the expression needs earlier samples, for example because of a lag.
+/// The values are NaN if a variable is not available, or if the expression has a table or a function that is not supported
+/// here, such as a lag.
 pub fn evaluate<'a>(
     of: &Expression,
     constants: &[f64],

@@ -1,5 +1,7 @@
-//! Expressions of at most nine nodes: functions of one variable, products of up to three of these functions, and
-//! functions of a sum of two variables.
+//! Expressions of at most nine nodes that may describe an unknown effect: functions of one variable, products of up to three of
+//! these functions, and functions of a sum of two variables.
+//!
+//! An atom is one of these functions. Shape constants are the constants inside functions, for example c in tanh(v/c).
 
 use greylag_physics::formula::Variable;
 use greylag_physics::formula::dimension::Dimension;
@@ -9,7 +11,7 @@ use greylag_physics::formula::units;
 /// Largest number of nodes of an expression: variables, numbers, functions and operators.
 pub const MOST_NODES: usize = 9;
 
-/// An expression whose shape constants are parameters, all dimensionless.
+/// An expression whose shape constants are parameters without dimension.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Free {
     /// The expression, with its parameters by index.
@@ -18,10 +20,10 @@ pub struct Free {
     pub constants: Vec<f64>,
 }
 
-/// A variable, with quantiles of its magnitude in the flights.
+/// A variable with quantiles of its magnitude in the flights. The quantiles set the values of the shape constants.
 #[derive(Clone, Copy, Debug)]
 pub struct Reach {
-    /// The variable, an input of expressions.
+    /// The variable of the expressions.
     pub variable: Variable,
     /// The quantiles 0.5, 0.75 and 0.95 of the variable's magnitude.
     pub levels: [f64; 3],
@@ -39,7 +41,7 @@ pub fn positive(variable: Variable) -> bool {
     matches!(variable, Variable::Throttle | Variable::Airspeed)
 }
 
-/// A factor of products: a function of one variable, or a function of a sum of two.
+/// A function of one variable, or a function of a sum of two variables.
 #[derive(Clone, Debug)]
 pub struct Atom {
     /// The expression of the atom, with its constants.
@@ -53,9 +55,9 @@ pub struct Atom {
 enum Kind {
     /// The atom has no constant.
     Plain,
-    /// The atom's constant is the middle one of the three quantiles.
+    /// The shape constant is the middle one of the three quantiles.
     Middle,
-    /// The atom's constant is the lowest or the highest quantile.
+    /// The shape constant is the lowest or the highest of the three quantiles.
     Outer,
     /// The atom is a function of a sum and is not combined with other atoms.
     Sum,
@@ -72,10 +74,10 @@ pub struct Candidate {
     pub constants: usize,
 }
 
-/// All expressions that are tried.
+/// All expressions that the search tries.
 #[derive(Clone, Debug)]
 pub struct Grammar {
-    /// The atoms, which are factors of products.
+    /// The atoms, from which products are formed.
     pub atoms: Vec<Atom>,
     /// Products with consistent units.
     pub candidates: Vec<Candidate>,
@@ -134,7 +136,7 @@ impl Grammar {
         }
     }
 
-    /// Adds functions of one variable with a constant.
+    /// Adds functions of one variable with a shape constant.
     fn add_bent(&mut self, reach: &Reach) {
         let v = || of(reach.variable);
         let c = || constant(0);
@@ -170,7 +172,7 @@ impl Grammar {
         }
     }
 
-    /// Adds functions of the sum v + c·w.
+    /// Adds functions of the sum v + c·w with the shape constant c.
     fn add_sums(&mut self, v: &Reach, w: &Reach) {
         let ratio = v.levels[1] / w.levels[1].max(f64::MIN_POSITIVE);
         if !ratio.is_finite() {
@@ -217,8 +219,8 @@ impl Grammar {
         }
     }
 
-    /// Adds the product of the atoms `parts` if each variable occurs once, the product is small enough, and its units
-    /// are consistent.
+    /// Adds the product of the atoms `parts` to the candidates if each variable occurs once, the product is small enough, and
+    /// its units are consistent.
     fn keep(&mut self, parts: Vec<usize>) {
         let atoms: Vec<&Atom> = parts.iter().map(|p| &self.atoms[*p]).collect();
         let of_one: Vec<Variable> =
@@ -241,7 +243,7 @@ impl Grammar {
     }
 }
 
-/// The product of `atoms`. Atoms that are divisors are in the denominator.
+/// The product of `atoms`. Atoms that are divisors are put into the denominator.
 fn product(atoms: &[&Atom]) -> Free {
     let (mut above, mut below) = (Expression::number(1.0), Expression::number(1.0));
     let mut constants = Vec::new();
@@ -270,14 +272,13 @@ fn renumber(of: &mut Expression, by: usize) {
 }
 
 impl Free {
-    /// Dimension of the expression; `None` if its units are inconsistent with dimensionless constants.
+    /// Dimension of the expression if its constants have no dimension; `None` if its units are then inconsistent.
     pub fn dimension(&self) -> Option<Dimension> {
         let plain = vec![Dimension::NONE; self.constants.len()];
         units::dimension(&self.expression, &plain).ok().flatten()
     }
 
-    /// The formula as text that can be a factor of a product. `names` replace the values of the constants if they are
-    /// given.
+    /// The expression as text that can be a factor of a product. `names` replace the values of the constants if they are given.
     pub fn text(&self, names: Option<&[String]>) -> String {
         let numbers: Vec<String> = self.constants.iter().map(|c| format!("{c}")).collect();
         let names: Vec<&str> = names.unwrap_or(&numbers).iter().map(String::as_str).collect();

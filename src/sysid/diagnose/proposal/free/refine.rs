@@ -1,4 +1,6 @@
-//! Fit of a form's constants with its coefficient eliminated (variable projection).
+//! Fit of the constants of a form, with its coefficient eliminated (variable projection). A form is a formula that may describe a
+//! missing effect, such as tanh(v/c) with the constant c. Its coefficient multiplies it. The form is fitted to the residual of
+//! one channel (a force or a moment).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,35 +11,36 @@ use crate::diagnose::regression::projected::scaled_inverse;
 
 /// Largest number of Gauss–Newton steps.
 const STEPS: usize = 6;
-/// Largest number of attempts for a step. The step is halved after each failed attempt.
+/// Largest number of attempts for a step. The step is halved after each attempt without improvement.
 const HALVINGS: usize = 4;
-/// Finite-difference step of a constant, as a share of its value.
+/// Finite-difference step of a constant, as a fraction of its value.
 const MOVED: f64 = 0.01;
-/// Largest change of a constant in one step, as a share of its value.
+/// Largest change of a constant in one step, as a fraction of its value.
 const REACH: f64 = 0.5;
-/// Convergence tolerance: the fit ends if a step increases the reduction of the residual by less than this share.
+/// The fit ends if a step increases the reduction of the sum of squares by no more than this fraction of the reduction.
 const RELATIVE_TOLERANCE: f64 = 1e-4;
 
-/// Data of a channel, and the factor of a form.
+/// The data of a channel to which a form is fitted.
 pub struct Place<'a> {
-    /// Whitened data of the channel.
+    /// Whitened data of the channel: filtered so that their noise is white.
     pub screen: &'a Screen<'a>,
-    /// Variables at every sample.
+    /// The variables of the form at every sample.
     pub samples: &'a Samples,
-    /// Factor of the form at every sample.
+    /// Factor by which the form is multiplied at every sample, such as the dynamic pressure.
     pub factor: &'a [f64],
 }
 
 impl Place<'_> {
-    /// Whitened and projected regressor of the form `free` with `constants`.
+    /// The regressor of the form `free` with `constants`, whitened, and with the nuisance parameters (coefficients of the model,
+    /// sensor errors) projected out.
     pub fn column(&self, free: &Free, constants: &[f64]) -> DVector<f64> {
         let mut values = self.samples.of(&free.expression, constants);
         values.iter_mut().zip(self.factor).for_each(|(x, f)| *x *= f);
         self.screen.projected(&DVector::from_vec(self.screen.column(values)))
     }
 
-    /// Fits the constants of `free` so that its regressor explains as much as possible of `target`. Returns the form
-    /// and the reduction of the sum of squares.
+    /// Fits the constants of `free` so that its regressor explains as much as possible of `target`. Returns the form with the
+    /// fitted constants, and the reduction of the sum of squares of `target`.
     pub fn refined(&self, free: &Free, target: &DVector<f64>) -> (Free, f64) {
         let mut best = free.constants.clone();
         let mut column = self.column(free, &best);
@@ -66,8 +69,8 @@ impl Place<'_> {
         (Free { expression: free.expression.clone(), constants: best }, fall)
     }
 
-    /// Gauss–Newton step of the constants with Kaufman's approximation: the derivatives are projected orthogonally to
-    /// the regressor `column`. `None` if the form has no constants or the step is not finite.
+    /// Gauss–Newton step of the constants with Kaufman's approximation: of the derivatives, only the part orthogonal to the
+    /// regressor `column` is used. `None` if the form has no constants or the step is not finite.
     fn step(
         &self,
         free: &Free,
@@ -98,7 +101,7 @@ impl Place<'_> {
     }
 }
 
-/// Reduction of the sum of squares of `target` by a projected regressor.
+/// Reduction of the sum of squares of `target` by the projected regressor `column`; zero if it is not finite.
 fn taken(column: &DVector<f64>, target: &DVector<f64>) -> f64 {
     let fall = column.dot(target).powi(2) / column.norm_squared();
     if fall.is_finite() { fall } else { 0.0 }

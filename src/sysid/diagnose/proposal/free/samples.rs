@@ -1,4 +1,5 @@
-//! Values of the variables of free forms (expressions of a grammar) at every sample, and their averages over windows.
+//! Values of the variables of free forms (expressions of a grammar) at every sample, and their averages over the windows of
+//! the weak form.
 
 use crate::diagnose::proposal::free::evaluate::evaluate;
 use crate::diagnose::search::round::Round;
@@ -138,7 +139,7 @@ impl Samples {
         values
     }
 
-    /// The windows of the cell with the index `cell` in `round`, in order.
+    /// The windows of the cell (one channel of one flight) with the index `cell` in `round`, in order.
     pub fn windows<'a>(&self, round: &'a Round, cell: usize) -> Vec<Average<'a>> {
         let cell = &round.cells.list[cell];
         let flight = &round.flights[cell.flight].acting;

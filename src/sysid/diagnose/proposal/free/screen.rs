@@ -1,9 +1,14 @@
-//! Evaluation of all forms on the whitened residual of one channel, in the flights and in bootstrap draws under the
-//! null hypothesis that no effect is missing.
+//! Computes how much of the residual of one channel (a force or a moment) each form explains. A form is a candidate formula
+//! without its coefficient. It is a regressor in a linear regression of the residual.
 //!
-//! The statistics are those of the library's round ([`Score`](crate::diagnose::regression::rank::Score)), with the
-//! model's coefficients projected out. They contain no errors-in-variables correction. The final ranking applies this
-//! correction to the best forms.
+//! The regression is over windows, short stretches of flight over which data are averaged. Residual and regressors are
+//! whitened: filtered so that the noise becomes white. The nuisance parameters (coefficients of the model, sensor errors) are
+//! projected out of both. The statistics are those of the search in the catalogue
+//! ([`Score`](crate::diagnose::regression::rank::Score)), but without its correction for noise in the regressors. The final
+//! ranking applies this correction to the best forms.
+//!
+//! The same statistics are computed in bootstrap draws under the null hypothesis that the model lacks nothing. In a draw, each
+//! block of windows has its noise with a random sign.
 
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
@@ -18,59 +23,59 @@ use greylag_physics::Channel;
 
 use super::samples::{Average, Samples};
 
-/// Number of the random stream for the bootstrap draws.
+/// Id of the random stream of the bootstrap draws.
 const NULLS: u64 = 84;
 
-/// One channel of all flights, prepared for the evaluation of arbitrary regressors.
+/// One channel of all flights, prepared for the evaluation of any regressor.
 pub struct Screen<'a> {
     round: &'a Round,
     samples: &'a Samples,
-    /// Indices of the channel's cells.
+    /// Indices of the cells of the channel. A cell has the windows of one channel of one flight.
     cells: Vec<usize>,
     windows: Vec<Vec<Average<'a>>>,
-    /// Whitened columns of the nuisance parameters.
+    /// Whitened regressors of the nuisance parameters, one column for each.
     known: DMatrix<f64>,
-    /// Reciprocals of the prior standard deviations of the nuisance parameters; 0 without a prior.
+    /// One over the prior standard deviation of each nuisance parameter; 0 without a prior.
     roots: DVector<f64>,
     /// Covariance of the nuisance parameters times `known`ᵀ.
     taken: DMatrix<f64>,
     /// Whitened residual of the re-estimated model. `noise` is the whitened noise.
     residual: DVector<f64>,
     noise: DVector<f64>,
-    /// First row, last row + 1 and number of each block.
+    /// For each block: its first row, its last row + 1, and its number.
     blocks: Vec<(usize, usize, usize)>,
     block_count: usize,
     /// Number of independent rows of the regression.
     support: f64,
 }
 
-/// Statistics of a regressor with the nuisance parameters projected out.
+/// Statistics of a regressor after the nuisance parameters were projected out of it.
 #[derive(Clone, Debug)]
 pub struct Kept {
     /// Squared norm of the projected regressor.
     square: f64,
     /// Product of the projected regressor with the residual.
     linear: f64,
-    /// Part of `square` that comes from the prior's pseudo-observations.
+    /// Part of `square` that comes from the prior, which acts like further rows (pseudo-observations).
     prior: f64,
-    /// Products of the projected regressor with residual, noise and itself, by block.
+    /// For each block: scalar products of the projected regressor with the residual, with the noise and with itself.
     blocks: Vec<[f64; 3]>,
     /// Regression coefficients of the regressor on the nuisance parameters, divided by their prior standard deviations.
     prior_shift: Vec<f64>,
 }
 
-/// Score of a form.
+/// The score of a form.
 #[derive(Clone, Copy, Debug)]
 pub struct Reached {
-    /// Reduction of the whitened residual sum of squares.
+    /// Reduction of the sum of squares of the whitened residual.
     pub fall: f64,
-    /// Evidence: the smaller of the penalised reduction and the block-robust Wald statistic. The penalty is ln n for
-    /// the coefficient and for each constant, with n independent rows.
+    /// Evidence: the reduction less a penalty, or the Wald statistic, whichever is smaller. The Wald statistic allows for
+    /// correlation within blocks. The penalty is ln n for the coefficient and for each constant, with n independent rows.
     pub evidence: f64,
 }
 
-/// A bootstrap draw under the null hypothesis: sign of each block's noise, and errors of the nuisance parameters in
-/// prior standard deviations.
+/// A bootstrap draw under the null hypothesis: a sign for the noise of each block, and errors of the nuisance parameters in units
+/// of their prior standard deviations.
 pub struct Null {
     signs: Vec<f64>,
     prior: DVector<f64>,
@@ -114,7 +119,7 @@ impl<'a> Screen<'a> {
             roots: DVector::from_iterator(na, round.known.iter().map(root)),
             residual: DVector::from_vec(residual),
             noise: DVector::from_vec(noise),
-            // neighbouring windows overlap by half, so only half of the rows are independent
+            // neighbouring windows overlap by half, so the rows count half as independent samples
             support: 0.5 * rows as f64,
             block_count: round.cells.blocks(),
             round,
@@ -125,7 +130,7 @@ impl<'a> Screen<'a> {
         })
     }
 
-    /// The whitened regressor with `values` at the samples, averaged over the windows.
+    /// The whitened regressor of a form with the values `values` at the samples, which are averaged over the windows.
     pub fn column(&self, values: Vec<f64>) -> Vec<f64> {
         let values = self.samples.merged(values);
         let mut rows = Vec::with_capacity(self.residual.len());
@@ -142,7 +147,7 @@ impl<'a> Screen<'a> {
         rows
     }
 
-    /// Computes the statistics of each column of `columns`, a matrix of whitened regressors.
+    /// The statistics of each column of `columns`, a matrix of whitened regressors.
     pub fn keep(&self, columns: &DMatrix<f64>) -> Vec<Kept> {
         let taken = &self.taken * columns;
         let left = columns - &self.known * &taken;
@@ -168,21 +173,20 @@ impl<'a> Screen<'a> {
         (0..columns.ncols()).map(one).collect()
     }
 
-    /// `column` minus the part that the nuisance parameters explain, followed by the rows of the prior's
-    /// pseudo-observations.
+    /// The regressor `column` less the part that the nuisance parameters explain, followed by the rows of the prior.
     pub fn projected(&self, column: &DVector<f64>) -> DVector<f64> {
         let taken = &self.taken * column;
         stacked(column - &self.known * &taken, -self.roots.component_mul(&taken))
     }
 
-    /// Whitened residual of the re-estimated model, followed by the rows of the prior's pseudo-observations.
+    /// Whitened residual of the re-estimated model, followed by the rows of the prior.
     pub fn residual(&self) -> DVector<f64> {
         let tuned = self.round.known.iter().zip(self.round.projected.tuned.iter());
         let off = DVector::from_iterator(self.roots.len(), tuned.map(|(k, t)| k.offset - t));
         stacked(self.residual.clone(), self.roots.component_mul(&off))
     }
 
-    /// Bootstrap draw number `k`. It depends only on `seed` and `k`.
+    /// The bootstrap draw number `k`. It depends on `seed` and `k` only.
     pub fn null(&self, seed: u64, k: usize) -> Null {
         let mut random = stream(seed, &[NULLS, k as u64]);
         let mut sign = || if random.random::<bool>() { 1.0 } else { -1.0 };
@@ -191,8 +195,7 @@ impl<'a> Screen<'a> {
         Null { signs, prior }
     }
 
-    /// Whitened residual of the re-estimated model in the draw `null`, followed by the rows of the prior's
-    /// pseudo-observations.
+    /// Whitened residual of the re-estimated model in the draw `null`, followed by the rows of the prior.
     pub fn residual_of(&self, null: &Null) -> DVector<f64> {
         let mut noise = self.noise.clone();
         for &(from, to, b) in &self.blocks {
@@ -204,13 +207,13 @@ impl<'a> Screen<'a> {
         stacked(noise - &self.known * taken, prior)
     }
 
-    /// Score in the measured flights of a form with `constants` shape constants.
+    /// The score in the measured flights of a form with the statistics `kept` and `constants` constants.
     pub fn measured(&self, kept: &Kept, constants: usize) -> Reached {
         let product = |b: usize| kept.blocks[b][0];
         self.reached(kept, kept.linear, product, constants)
     }
 
-    /// Score in the draw `null` of a form with `constants` shape constants.
+    /// The score in the draw `null` of a form with the statistics `kept` and `constants` constants.
     pub fn by_chance(&self, kept: &Kept, null: &Null, constants: usize) -> Reached {
         let product = |b: usize| null.signs[b] * kept.blocks[b][1];
         let noise: f64 = (0..self.block_count).map(product).sum();
@@ -236,13 +239,12 @@ impl<'a> Screen<'a> {
         let evidence = gain.min(wald);
         match evidence.is_finite() {
             true => Reached { fall, evidence },
-            // a column that is zero, infinite or a combination of the model's columns
+            // the regressor is zero, not finite, or a linear combination of the regressors of the nuisance parameters
             false => Reached { fall: 0.0, evidence: f64::NEG_INFINITY },
         }
     }
 
-    /// Penalty for a coefficient and `constants` shape constants, which the reduction of the residual sum of squares
-    /// must exceed.
+    /// The penalty for a coefficient and `constants` constants, in units of the sum of squares of the whitened residual.
     pub fn price(&self, constants: usize) -> f64 {
         (1 + constants) as f64 * self.support.max(2.0).ln()
     }

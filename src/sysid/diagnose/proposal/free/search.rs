@@ -1,5 +1,6 @@
-//! Search over free forms (expressions of a grammar): evaluates the whole grammar, fits the best forms, and finds the
-//! best form of each size.
+//! Search for a formula of a missing effect among free forms, which are all expressions of a grammar up to a size. Every form
+//! is evaluated with preset shape constants (constants inside its functions). The constants of the best forms are then
+//! fitted. The residual is that of one channel, a force or a moment.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -22,9 +23,9 @@ use greylag_physics::formula::{Variable, file};
 const BATCH: usize = 64;
 /// Number of batches between two progress reports.
 const REPORT_EVERY: usize = 32;
-/// Number of forms of each size whose constants are fitted.
+/// Number of forms of each size (number of nodes) whose constants are fitted.
 const FITTED: usize = 8;
-/// Number of forms of a channel that take part in the final ranking with the library's forms.
+/// Number of forms of a channel that are ranked together with the forms of the library of fixed shapes.
 const FINALISTS: usize = 20;
 /// Significant figures of a fitted constant.
 const FIGURES: usize = 2;
@@ -36,11 +37,11 @@ pub struct Fitted {
     pub form: Form,
     /// Number of nodes of its expression.
     pub size: usize,
-    /// Reduction of the whitened residual sum of squares.
+    /// Reduction of the whitened residual sum of squares by the form.
     pub fall: f64,
     /// The reduction minus the penalties for its constants and for the number of forms of its size.
     pub worth: f64,
-    /// The smaller of the penalised reduction and the block-robust Wald statistic.
+    /// Evidence: the smaller of the penalised reduction and the block-robust Wald statistic.
     pub evidence: f64,
 }
 
@@ -56,7 +57,7 @@ pub struct Searched {
     pub finalists: Vec<Fitted>,
 }
 
-/// Either all forms that scale with dynamic pressure, or all other forms.
+/// One of two sets of forms: those that scale with dynamic pressure, or all others.
 struct Side {
     of_air: bool,
     grammar: Grammar,
@@ -67,7 +68,7 @@ struct Side {
 /// Searches the free forms for `channel` in the residual of `round`. `None` if no flight measures the channel.
 ///
 /// # Errors
-/// `progress` cancelled.
+/// If `progress` cancels the search.
 pub fn searched(
     round: &Round,
     channel: Channel,
@@ -109,7 +110,7 @@ pub fn searched(
     }))
 }
 
-/// The variables of `variables` that can be computed, with quantiles of their magnitude in the flights.
+/// The variables that can be computed for the flights, with quantiles of their magnitude.
 fn reaches(samples: &Samples, variables: &[Variable]) -> Vec<Reach> {
     let of = |variable: &Variable| {
         let all = samples.variable(*variable)?;
@@ -127,7 +128,7 @@ fn rounded(x: f64) -> f64 {
 }
 
 impl Side {
-    /// Evaluates all forms. `on_progress` receives the number of forms that are done.
+    /// Evaluates all forms and stores the results in `kept`. `on_progress` receives the number of forms that are done.
     fn keep(
         &mut self,
         screen: &Screen,
@@ -182,13 +183,13 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Penalty of a form of `size` nodes with `constants` shape constants. It covers the coefficients of the form, and
-    /// its selection among all forms of this size.
+    /// Penalty of a form of `size` nodes with `constants` shape constants. It accounts for the fitted numbers of the form, and
+    /// for its selection among all forms of this size.
     fn price(&self, size: usize, constants: usize) -> f64 {
         self.screen.price(constants) + 2.0 * (self.counts[size].max(1) as f64).ln()
     }
 
-    /// The best forms of each size in the measured flights, with fitted constants.
+    /// The best forms of each size for the measured residual, with fitted constants.
     fn fitted(&self, sides: &[Side]) -> Vec<Fitted> {
         let mut best: Vec<(usize, usize, f64)> = Vec::new();
         for size in 1..=MOST_NODES {
@@ -217,7 +218,7 @@ impl Search<'_> {
         fitted
     }
 
-    /// Computes the score of `free`. `None` if an effect file cannot represent the form.
+    /// Scores the form `free`. `None` if an effect file cannot represent it.
     fn judged(&self, side: &Side, free: Free) -> Option<Fitted> {
         let mut values = self.samples.of(&free.expression, &free.constants);
         values.iter_mut().zip(&side.factor).for_each(|(x, f)| *x *= f);
@@ -233,8 +234,8 @@ impl Search<'_> {
         Some(Fitted { form, size, fall: reached.fall, worth, evidence: reached.evidence })
     }
 
-    /// Best evidence of the search in each bootstrap draw under the null hypothesis. The constants of the best form are
-    /// fitted as in the measured flights.
+    /// Best evidence of the search in each bootstrap draw under the null hypothesis that no effect is missing. The constants of
+    /// the best form are fitted as for the measured residual.
     fn nulls(&self, sides: &[Side], options: &Options) -> Vec<f64> {
         let of = |k: usize| {
             let null = self.screen.null(options.seed, k);
@@ -277,7 +278,7 @@ fn front(fitted: &[Fitted]) -> Vec<Fitted> {
     front
 }
 
-/// The front and the best other forms, at most `FINALISTS` in all, in descending order of `worth`.
+/// The best form of each size and the best other forms, at most `FINALISTS` in all, in descending order of `worth`.
 fn finalists(fitted: Vec<Fitted>) -> Vec<Fitted> {
     let front = front(&fitted);
     let mut all: Vec<Fitted> = front.clone();

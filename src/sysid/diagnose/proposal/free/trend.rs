@@ -1,4 +1,5 @@
-//! Trend of a shape with each of its variables (monotonic or not, odd or even), determined by sampling.
+//! Trend of a formula with each of its variables (monotonic or not, odd or even), determined by sampling. The formula without
+//! its coefficients is called shape.
 
 use super::evaluate::evaluate;
 use super::grammar::positive;
@@ -6,16 +7,16 @@ use greylag_physics::formula::Variable;
 use greylag_physics::formula::expression::Expression;
 use greylag_physics::formula::parser;
 
-/// Values of a variable at which a shape is sampled, as shares of the variable's range.
+/// Values of a variable at which a shape is sampled, as fractions of the variable's typical range in flight.
 const ALONG: [f64; 8] = [0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0];
-/// Constant values of the other variables, as shares of their ranges.
+/// Constant values of the other variables, as fractions of their typical ranges.
 const BESIDE: [f64; 3] = [0.9, 0.37, 0.71];
-/// Share of a variable's possible range that flights typically cover.
+/// Fraction of a variable's possible range that flights typically cover.
 const FLOWN: f64 = 0.3;
-/// Differences below this share of the largest value count as rounding errors.
+/// Differences below this fraction of the largest value count as rounding errors.
 const ROUNDING: f64 = 1e-9;
 
-/// The trend of `shape` with each of its variables, in words. Equal trends have equal words. `None` if `shape` is not a
+/// Text about the trend of `shape` with each of its variables. Equal trends have equal texts. `None` if `shape` is not a
 /// formula.
 ///
 /// A body rate and the same rate divided by the airspeed count as one variable.
@@ -38,13 +39,13 @@ pub fn plain(v: Variable) -> &'static str {
     }
 }
 
-/// Typical largest value of the variable in flight. A positive variable may reach its largest possible value, other
-/// variables `FLOWN` times this value.
+/// Typical largest value of the variable in flight. A positive variable may reach its largest possible value. Other
+/// variables reach `FLOWN` times their largest possible value.
 fn reach(v: Variable) -> f64 {
     if positive(v) { v.range()[1] } else { FLOWN * v.range()[1] }
 }
 
-/// The trend with variable `v`, in words; the other variables are constant.
+/// Text about the trend with variable `v`, while the other variables are constant.
 fn along(expression: &Expression, variables: &[Variable], v: Variable) -> String {
     let values = |sign: f64| {
         let columns: Vec<(Variable, Vec<f64>)> = variables

@@ -1,5 +1,5 @@
 //! Nuisance parameters of a round, with their regressors: free coefficients of the model, constants of each flight,
-//! sensor errors.
+//! sensor errors. A round is a model linearised over all flights.
 
 use super::Problem;
 use crate::diagnose::regression::catalogue::{self, Entry};
@@ -10,7 +10,7 @@ use crate::diagnose::regression::projected::{Known, Projected};
 use crate::diagnose::regression::{per_flight, sensors};
 use greylag_model::GreyBox;
 
-/// Nuisance parameters, indices of the free coefficients among those of the model, and columns by flight.
+/// Nuisance parameters, indices of the free coefficients among those of the model, and regressors (columns) by flight.
 type KnownColumns = (Vec<Known>, Vec<usize>, Vec<Placed>);
 
 /// Returns the nuisance parameters and their columns. The free coefficients come first, then the constants of all

@@ -1,5 +1,5 @@
-//! Errors-in-variables bias: products of regressors and residual that are due to common noise. Simulated noise
-//! determines them.
+//! The errors-in-variables bias: the mean of the scalar products of regressors (columns) and residual that is due to sensor noise
+//! in both. It is computed by adding simulated noise to the flights.
 
 use crate::diagnose::regression::shared;
 use rayon::prelude::*;
@@ -12,11 +12,11 @@ use crate::diagnose::regression::columns::Ready;
 use crate::diagnose::regression::noise::Noise;
 use greylag_model::GreyBox;
 
-/// Number of noise draws over which the bias is averaged. With a single draw, the evidence for an inertia error that
-/// did not exist was 3, 11 or 19, depending on the seed.
+/// Number of draws of the noise over which the bias is averaged. With a single draw, the evidence (test statistic) for an inertia
+/// error that did not exist was 3, 11 or 19, depending on the seed.
 const DRAWS: usize = 8;
 
-/// Data, model and candidates of a round.
+/// Flights, model and candidate effects of a round of the search. In a round, the model is linearised over all flights.
 pub(super) struct Setting<'a> {
     pub(super) problem: &'a Problem,
     pub(super) model: &'a GreyBox,
@@ -24,13 +24,13 @@ pub(super) struct Setting<'a> {
     pub(super) accelerating: Option<&'a GreyBox>,
 }
 
-/// Elementwise sum of lists of equal length.
+/// The elementwise sum of lists of equal length.
 pub(super) fn sum(lists: &[Vec<f64>]) -> Vec<f64> {
     let count = lists.first().map_or(0, Vec::len);
     (0..count).map(|k| lists.iter().map(|list| list[k]).sum()).collect()
 }
 
-/// The flights with added simulated noise, evaluated under the model. `draw` is the number of the draw.
+/// The flights with simulated noise added, and with the predictions of the model. `draw` is the number of the draw.
 pub(super) fn disturbed(of: &Setting, draw: usize) -> Vec<Ready> {
     let flights = of.problem.flights.par_iter().zip(&of.problem.path).enumerate();
     flights
@@ -41,12 +41,11 @@ pub(super) fn disturbed(of: &Setting, draw: usize) -> Vec<Ready> {
         .collect()
 }
 
-/// Bias of the products of columns and residual due to common noise, by flight and index of the column. The columns are
-/// those of the nuisance parameters and the linear candidates.
+/// For each flight and each column, the bias of the scalar product with the residual. The columns are those of the nuisance
+/// parameters (coefficients of the model, sensor errors) and of the linear candidates.
 ///
-/// `before` holds the columns without added noise, with the residual at the index `last`. The bias is the mean of
-/// `DRAWS` draws; without candidates, a single draw suffices. Also returns the columns with the noise of the first
-/// draw.
+/// `before` has the columns without added noise, with the residual at the index `last`. The bias is the mean over [`DRAWS`]
+/// draws, or a single draw if there are no candidates. The second result has the columns with the noise of the first draw.
 pub(super) fn shared(
     of: &Setting,
     cells: &Cells,
@@ -59,7 +58,7 @@ pub(super) fn shared(
     let everything = catalogue::with_all(of.model, &straight).0;
     let drawn = |draw: usize| {
         let flights = disturbed(of, draw);
-        // one pass computes the columns of the model and of the candidates
+        // the columns of the model's and the candidates' coefficients are computed together
         let all = |flight: &Ready| {
             let mut own = flight.linear(&everything, 0..everything.coefficients().len());
             let candidates = own.split_off(of.model.coefficients().len());

@@ -1,4 +1,5 @@
-//! Models, residuals and contributions of effects, as computed from the fit of a round.
+//! Results of the fit of a round. A round is the model linearised over the flights, with effects that it may lack as
+//! candidates. The fit re-estimates the model's coefficients and the sensor errors. A [`Score`] is the fit of one candidate.
 
 use super::Round;
 use crate::diagnose::regression::catalogue::{self};
@@ -9,8 +10,8 @@ use crate::diagnose::regression::rank::Score;
 use greylag_model::GreyBox;
 
 impl Round {
-    /// The model with the coefficients from a joint fit with the effect of `score`. The effect itself is not added to
-    /// the model.
+    /// The model with the coefficients from a joint fit with the candidate of `score`. The candidate itself is not added to the
+    /// model.
     pub fn with(&self, score: &Score) -> GreyBox {
         let p = &self.projected;
         let mut model = self.model.clone();
@@ -23,7 +24,7 @@ impl Round {
         model
     }
 
-    /// Largest change of a coefficient in the fit, in standard deviations of the coefficient. It is small after
+    /// Largest change of a coefficient of the model in the fit, in standard deviations of its estimate. It is small after
     /// convergence.
     pub fn stride(&self) -> f64 {
         let p = &self.projected;
@@ -31,7 +32,7 @@ impl Round {
         (0..self.coefficients.len()).map(of).filter(|x| x.is_finite()).fold(0.0, f64::max)
     }
 
-    /// Residual of forces (N) and moments (N m) by flight, after the fit of the model and the sensor errors.
+    /// For each flight: the residual of forces (N) and moments (N m) after the fit without candidates.
     pub fn tuned_residual(&self) -> Vec<Column> {
         let na = self.known.len();
         let of = |placed: &Placed| {
@@ -50,7 +51,7 @@ impl Round {
         self.placed.iter().map(of).collect()
     }
 
-    /// Fitted contribution of the effect of `score` to forces (N) and moments (N m), by flight.
+    /// For each flight: the fitted contribution of the candidate of `score` to forces (N) and moments (N m).
     pub fn contribution(&self, score: &Score) -> Vec<Column> {
         let na = self.known.len();
         let of = |placed: &Placed| {
@@ -67,8 +68,8 @@ impl Round {
         self.placed.iter().map(of).collect()
     }
 
-    /// Residual of forces (N) and moments (N m) by flight, after a joint fit of the effect of `score` and the nuisance
-    /// parameters.
+    /// For each flight: the residual of forces (N) and moments (N m) after a joint fit of the candidate of `score`, the model and
+    /// the sensor errors.
     pub fn residual_with(&self, score: &Score) -> Vec<Column> {
         let added = self.contribution(score);
         let given = |place: usize| -> f64 {
@@ -87,7 +88,7 @@ impl Round {
         self.tuned_residual().into_iter().zip(added).zip(&self.placed).map(of).collect()
     }
 
-    /// Reduction of the whitened residual sum of squares by the effect of `score`, by channel.
+    /// For each channel (force or moment): the reduction of the whitened residual sum of squares by the candidate of `score`.
     pub fn taken_by(&self, score: &Score) -> [f64; 6] {
         let mut taken = [0.0; 6];
         let last = self.projected.width();
@@ -100,8 +101,8 @@ impl Round {
         taken
     }
 
-    /// Indices of the channels in which the effect of `score` reduces the residual sum of squares most, in descending
-    /// order. Channels with less than a tenth of the largest reduction are left out.
+    /// Indices of the channels in descending order of the reduction by the candidate of `score`. Channels with less than a tenth
+    /// of the largest reduction are left out.
     pub fn channels_of(&self, score: &Score) -> Vec<usize> {
         let taken = self.taken_by(score);
         let most = taken.iter().fold(0.0_f64, |a, b| a.max(*b));
@@ -111,8 +112,8 @@ impl Round {
         channels
     }
 
-    /// The model with coefficients estimated from data and prior. Coefficients of added effects stay within their
-    /// bounds. Changes of mass and inertia are reduced until the body is physically possible.
+    /// The model with coefficients estimated from data and prior. Steps of nonlinear coefficients are limited. Coefficients of
+    /// added effects stay within their bounds. Changes of mass and inertia are reduced until the body is physically possible.
     pub fn tuned(&self) -> GreyBox {
         let mut model = self.model.clone();
         let linear = model.linear();

@@ -1,4 +1,6 @@
-//! Result of the search: the selected effects with their checks, and the remaining residual.
+//! Result of the search for missing effects: the selected effects with their checks, and the remaining residual. In each round
+//! of the search the model is linearised over all flights and the candidate effects are ranked. Evidence is the test statistic
+//! of the ranking. A flexible model is a regression without physics.
 
 use crate::diagnose::regression::gather::Column;
 use crate::diagnose::regression::rank::Score;
@@ -56,11 +58,11 @@ pub struct Found {
     /// Unexplained share of each channel's variance beyond noise in the first round; NaN if the channel is not
     /// measured.
     pub unexplained: [f64; 6],
-    /// Part of the first round's residual that a flexible model could remove.
+    /// Part of the first round's residual that a flexible model could remove on flights to which it is not fitted.
     pub first_remainder: Remainder,
     /// The last round, whose model contains all added effects; `None` if no effect was added.
     pub last: Option<Round>,
-    /// Part of the last round's residual that a flexible model could remove.
+    /// The same part of the last round's residual.
     pub remainder: Remainder,
     /// Residual beyond noise of the last round's model; `None` if no effect was added.
     pub beyond: Option<checks::Beyond>,
@@ -78,8 +80,8 @@ pub struct Found {
     pub level: Vec<usize>,
     /// Asserted effects in the order of selection, then the refused ones.
     pub selected: Vec<Selected>,
-    /// Standard deviation of each coefficient of the last round's model due to discretisation; empty if no effect was
-    /// added.
+    /// Standard deviation of each coefficient of the last round's model, due to sums over samples in place of integrals; empty
+    /// if no effect was added.
     pub sums: Vec<f64>,
 }
 
@@ -107,8 +109,8 @@ impl Found {
         self.left().iter().any(|share| *share >= ADEQUATE)
     }
 
-    /// Share of the residual beyond noise, as it was in the first round, that a flexible model could still remove after
-    /// the last round.
+    /// Reduction of the residual that a flexible model could still achieve after the last round, as a share of the first
+    /// round's residual beyond noise.
     pub fn learnable(&self) -> f64 {
         let excess = checks::excess(&self.first, &[true; 6]);
         self.remainder.total / excess.max(self.remainder.total).max(1.0)

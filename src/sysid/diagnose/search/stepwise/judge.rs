@@ -1,22 +1,22 @@
-//! Refusal of selected effects, mainly because too much of the residual remains in their channels.
+//! Refuses effects that the search has selected, mainly because too much of the residual remains in their channels. A refused
+//! effect is reported but not asserted. A channel is a force or a moment.
 
 use super::found::{Found, Selected};
 use crate::compare::ChannelId;
 use greylag_physics::inputs::{Acts, Kind};
 
-/// Largest share of the residual that an effect may leave in its channels.
+/// Largest fraction of the residual that an effect may leave in its channels.
 const LEFT: f64 = 0.3;
-/// Products of states must explain less than this share of what the products and the effects explain together. With
-/// correct effects, the share is below 0.02. An exception is `unsteady_lift`, whose formula differs from the
-/// simulator's.
+/// Largest fraction that products of states may explain of what these products and the effects explain together. With correct
+/// effects, the fraction is below 0.02. An exception is `unsteady_lift`, whose formula differs from that of the simulator.
 const SHAPELESS: f64 = 0.1;
-/// Limit of the same share for second derivatives of the deflections, if the effect acts on the deflections.
+/// The same limit for second derivatives of the deflections. It applies to effects that change the deflections.
 const BENT: f64 = 0.02;
 
 impl Found {
-    /// Refuses effects that leave too much of the residual in their own channels. Three parts of the residual are
-    /// checked: the part that a flexible model could remove, the part beyond noise, and the part that products of
-    /// states or second derivatives of the deflections explain.
+    /// Refuses effects that leave too much of the residual in their own channels. Three parts of it are checked: the part that a
+    /// flexible model (a regression without physics) could remove, the part beyond noise, and the part that products of states or
+    /// second derivatives of the deflections explain.
     pub(super) fn judge_remainder(&mut self) {
         let (before, after) = (&self.first_remainder, &self.remainder);
         let real = |s: &&Selected| s.refused.is_empty() && !s.absorbs_prior_error;
@@ -45,7 +45,7 @@ impl Found {
                 ));
             }
             let Some(shape) = &self.shape else { continue };
-            // effects in the same channel share its residual, so their reductions are added
+            // several effects may explain the residual of the same channel, so their reductions are added
             let others = taken.iter().filter(|(id, _)| *id != effect.id);
             let others: f64 =
                 others.map(|(_, of)| effect.channels.iter().map(|c| of[*c]).sum::<f64>()).sum();
@@ -71,8 +71,7 @@ impl Found {
         self.refuse_companions();
     }
 
-    /// Refuses every effect that acts in one of `channels`, with the reason `reason`. The effect `except` is not
-    /// refused.
+    /// Refuses every effect that acts in one of `channels`, with the reason `reason`. The effect with the id `except` is spared.
     pub fn refuse_in(&mut self, channels: &[ChannelId], except: &str, reason: &str) {
         let touched = |c: &usize| channels.contains(&ChannelId::ALL[*c]);
         let spared = |s: &&mut Selected| s.id != except && s.channels.iter().any(touched);
@@ -82,8 +81,8 @@ impl Found {
         self.refuse_companions();
     }
 
-    /// Refuses an effect if the flights cannot assess the model in any of its channels. `abstained` holds the reason
-    /// for each channel that cannot be assessed, and `None` for the others.
+    /// Refuses an effect if the model can be assessed in none of its channels. For each channel, `abstained` has the reason why
+    /// the flights do not suffice to assess the model in it; `None` if they do.
     pub fn refuse_where_abstained(&mut self, abstained: &[Option<String>; 6]) {
         for effect in self.selected.iter_mut().filter(|s| s.refused.is_empty()) {
             let whys: Option<Vec<&String>> =
@@ -99,15 +98,15 @@ impl Found {
         self.selected.iter_mut().for_each(|effect| effect.refused.push(reason.to_owned()));
     }
 
-    /// Refuses those selected effects whose ids are in `ids`, with the reason `reason`.
+    /// Refuses the selected effects with an id in `ids`, with the reason `reason`.
     pub fn refuse(&mut self, ids: &[String], reason: &str) {
         for effect in self.selected.iter_mut().filter(|s| ids.iter().any(|id| id == s.id)) {
             effect.refused.push(reason.to_owned());
         }
     }
 
-    /// Refuses the effects that were selected after a refused effect, because they were found with that effect in the
-    /// model. An effect that was refused only as too small does not count.
+    /// Refuses the effects that were selected after the first refused effect, because that effect was in the model when they were
+    /// found. Effects that are significant but too small to be asserted do not count as refused here.
     fn refuse_companions(&mut self) {
         let refused = |s: &Selected| !s.refused.is_empty() && s.trace.is_none();
         let Some(first) = self.selected.iter().position(refused) else { return };

@@ -1,23 +1,25 @@
-//! Comparison of candidate effects with similar scores. Each is added to the model in turn, and all coefficients are
-//! re-estimated.
+//! Decides between candidate effects with similar scores. Each is added to the model alone, all coefficients are
+//! re-estimated, and the remaining errors are compared.
 
 use super::found::Found;
 use crate::diagnose::search::checks;
 use crate::diagnose::search::round::Problem;
 use crate::diagnose::search::settling::{SETTLING, settled};
 
-/// A candidate is a contender if its ranking criterion (`Score::order`) exceeds this share of the best candidate's criterion.
+/// Smallest ranking criterion (`Score::order`) of a contender, a candidate that is compared in this way, as a share of the
+/// best candidate's criterion.
 const CONTENDING: f64 = 0.2;
-/// Smallest magnitude of the correlation between the contributions of a contender and of the best candidate.
+/// Smallest magnitude of the correlation between the fitted contributions of a contender and of the best candidate.
 const CONTENDING_CORRELATION: f64 = 0.6;
 /// Largest number of contenders, the best candidate included.
 const CONTENDERS: usize = 4;
 
-/// Compares the contenders. Each is added to the model in turn, and all coefficients are re-estimated with the same
-/// noise. The linearisation about the model without the contenders cannot distinguish them.
+/// Compares the contenders. The linearisation about the model without them cannot distinguish them. The noise estimate is
+/// the same for all.
 ///
 /// The best contender moves to the first place of the ranking. The others are recorded as clearly worse or as equally
-/// good. Returns `None` if there are fewer than two contenders.
+/// good. Returns `None` and changes nothing if there are fewer than two contenders, or if the evidence of the best candidate
+/// is below the threshold.
 pub(super) fn run_off(problem: &Problem, found: &mut Found) -> Option<()> {
     let round = found.last.as_ref().unwrap_or(&found.first);
     let (_, best) = found.scores.first()?;
