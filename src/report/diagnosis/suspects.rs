@@ -124,7 +124,7 @@ pub(crate) fn curves(d: &Diagnosis) -> Section {
     // curves of candidates that are not asserted must not appear to be findings
     let title = match d.effects.iter().any(|c| c.asserted) {
         true => "The effect",
-        false => "The nearest suspects, none of them shown",
+        false => "Nearest suspects, none proven",
     };
     Section::new(title, &note, vec![Figure::Choice(choice)])
 }

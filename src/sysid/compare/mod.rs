@@ -15,6 +15,7 @@ pub mod forecast;
 pub mod free_run;
 mod known;
 pub mod observer;
+mod order;
 mod power;
 mod result;
 mod run;
