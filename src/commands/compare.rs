@@ -177,7 +177,8 @@ fn print(comparison: &Comparison) {
     print_answer(&comparison.answer);
     for (model, letter) in comparison.models.iter().zip(letters()) {
         println!("{letter}  {}", model.name);
-        model.sentences.iter().for_each(|sentence| println!("   {sentence}"));
+        let sentences = model.sentences_worst_first();
+        sentences.iter().for_each(|sentence| println!("   {sentence}"));
         println!();
     }
     println!("{}\n{}", free_run_table(comparison), channel_table(&comparison.models));
@@ -239,7 +240,7 @@ fn channel_table(models: &[ModelResult]) -> Table {
     let header = ["", "channel", "unexplained", "measured sd", "residual", "noise", "unit"];
     let mut table = table(header, 2);
     for (model, letter) in models.iter().zip(letters()) {
-        for c in &model.channels {
+        for c in model.worst_first() {
             let share = match c.unexplained_fraction {
                 share if share.is_nan() => "not excited".into(),
                 share => format!("{:.2} %", 100.0 * share),

@@ -155,7 +155,12 @@ fn next(
     match (diagnosis.verdict, between) {
         (Verdict::Effect, Some(pair)) if in_doubt(diagnosis) => design(&model, pair, words),
         (Verdict::Effect, _) if only_axes(alike(diagnosis)) => turned(&model, &logs, &out),
-        (Verdict::Effect, _) => format!("greylag amend --model {model}{logs} --accept --out {out}"),
+        (Verdict::Effect, _) => {
+            let found = diagnosis.effects.iter().filter(|c| c.asserted).map(|c| c.id.as_str());
+            let written = arguments.json.as_deref().filter(|path| !files::is_stdout(Some(*path)));
+            let added = added(&found.collect::<Vec<_>>(), words, written);
+            format!("greylag amend --model {model}{logs} {added} --out {out}")
+        }
         (Verdict::Adequate, _) if change_percent > -WORTH_TUNING => {
             format!("greylag aircraft check --model {model}")
         }
@@ -166,11 +171,21 @@ fn next(
         (Verdict::Unexplained, _) if arguments.logs.paths.len() < 2 => String::new(),
         (Verdict::Unexplained, _) => format!("greylag propose --model {model}{logs}"),
         // the flights themselves are in doubt, so the logs are inspected first
-        (Verdict::Unknown, _) => arguments
-            .logs
-            .paths
-            .iter()
-            .fold("greylag logs info".into(), |line, log| line + " " + &quoted(log)),
+        (Verdict::Unknown, _) => arguments.logs.inspected(),
+    }
+}
+
+/// The option of `greylag amend` that adds the effects `ids`. With `--accept` the command would diagnose the fitted logs alone
+/// and could find nothing. The fit tries several effects of the file `written` of the diagnosis together, so this file is
+/// preferred to their names. Effects that come from effect files, in `words`, are always named.
+fn added(ids: &[&str], words: &BTreeMap<String, String>, written: Option<&Path>) -> String {
+    let from_files = ids.iter().any(|id| words.contains_key(*id));
+    match written {
+        Some(path) if ids.len() > 1 && !from_files => format!("--diagnosis {}", quoted(path)),
+        _ => {
+            let named = |id: &&str| words.get(*id).map_or(*id, String::as_str).to_owned();
+            format!("--effect {}", ids.iter().map(named).collect::<Vec<_>>().join(" "))
+        }
     }
 }
 
@@ -358,6 +373,19 @@ mod tests {
         }
         let line = turned("model.toml", " --log a.csv", "amended");
         assert!(matches!(command_of(&words(&line)), Ok(Command::Amend(_))), "{line}");
+        let json = Some(Path::new("found.json"));
+        for (found, written, option) in [
+            (&["lift_stall"][..], None, "--effect lift_stall"),
+            (&["lift_stall"][..], json, "--effect lift_stall"),
+            (&["lift_stall", "inertia"][..], None, "--effect lift_stall inertia"),
+            (&["lift_stall", "inertia"][..], json, "--diagnosis found.json"),
+            (&["lift_stall", "mine"][..], json, "--effect lift_stall effects/mine.toml"),
+        ] {
+            let added = added(found, &files, written);
+            assert_eq!(added, option);
+            let line = format!("greylag amend --model m.toml --log a.csv {added} --out amended");
+            assert!(matches!(command_of(&words(&line)), Ok(Command::Amend(_))), "{line}");
+        }
     }
 
     #[test]

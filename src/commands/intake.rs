@@ -87,6 +87,14 @@ impl LogArguments {
         format!(" --log{logs}{}", self.reading.words())
     }
 
+    /// The command that inspects the logs. It lacks the option for logs with problems, because it names these problems.
+    #[cfg(feature = "study")]
+    pub fn inspected(&self) -> String {
+        let reading = Reading { despite_problems: false, ..self.reading.clone() };
+        let logs: String = self.paths.iter().map(|log| format!(" {}", quoted(log))).collect();
+        format!("greylag logs info{logs}{}", reading.words())
+    }
+
     /// The options for reading the logs, as arguments of another command.
     #[cfg(feature = "study")]
     pub fn reading_words(&self) -> Vec<std::ffi::OsString> {
@@ -256,5 +264,25 @@ fn refuse_problems(path: &Path, findings: &[Finding]) -> Result<()> {
         false => {
             bail!("flight log {log}: {}. Every figure would be wrong; {right}", all.join("; "))
         }
+    }
+}
+
+#[cfg(all(test, feature = "study"))]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        logs: LogArguments,
+    }
+
+    #[test]
+    fn the_logs_are_inspected_as_they_were_read() {
+        let words = "greylag --log a.csv 'b.csv --mapping m.toml --despite-problems";
+        let line = Line::parse_from(words.split(' '));
+        let command = r"greylag logs info a.csv ''\''b.csv' --mapping m.toml";
+        assert_eq!(line.logs.inspected(), command);
     }
 }

@@ -275,7 +275,7 @@ fn readme(out: &Path) -> String {
          2. Ask what is missing:\n\
          \x20  greylag diagnose --model {d}/model.toml --log {train} --json {d}/diagnosis.json --report {d}/diagnosis.html\n\
          3. Add it, and fit model and effect anew:\n\
-         \x20  greylag amend --model {d}/model.toml --log {train} --accept --out {d}/amended\n\
+         \x20  greylag amend --model {d}/model.toml --log {train} --diagnosis {d}/diagnosis.json --out {d}/amended\n\
          4. See the error fall on flights that the fit never saw:\n\
          \x20  greylag compare --model {d}/model.toml {d}/amended/model.toml --log {test}\n\
          5. Open the answer:\n\

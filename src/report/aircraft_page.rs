@@ -1,6 +1,7 @@
 //! The HTML page about an aircraft: three views, and trim, modes, LQI loops and control responses computed from its model.
 
 use std::fmt::Write;
+use std::path::Path;
 
 use crate::Align::{Left, Right};
 use crate::kit::numbers::number;
@@ -9,6 +10,7 @@ use crate::{
 };
 use greylag_control::aircraft_check::AircraftCheck;
 use greylag_control::stick_response::{STEPPED, StickResponse};
+use greylag_logs::quoted;
 use greylag_model::GreyBox;
 
 /// Contents of the page about an aircraft.
@@ -77,6 +79,7 @@ impl AircraftReport<'_> {
                 number(v)
             )
         }));
+        let model = quoted(Path::new(&self.model_file));
         let flies = format!(
             "flies straight from {} to {} m/s",
             number(envelope.airspeed_min_mps),
@@ -87,16 +90,12 @@ impl AircraftReport<'_> {
                 outcome: Outcome::Sound,
                 reason: String::new(),
                 sentence: format!("It {flies}; nothing needs correction."),
-                details: [
-                    "Fly it; then fit it to the logs of its flights (FLIGHTS) in a new FOLDER."
-                        .to_string(),
-                ]
-                .into_iter()
-                .chain(details)
-                .collect(),
+                details,
+                before_next:
+                    "fly it, then fit it (FLIGHTS: the logs of its flights; FOLDER: a new folder):"
+                        .into(),
                 next: format!(
-                    "greylag amend --model {} --log FLIGHTS --tune-only --out FOLDER",
-                    self.model_file
+                    "greylag amend --model {model} --log FLIGHTS --tune-only --out FOLDER"
                 ),
             },
             Some((first, rest)) => Verdict {
@@ -104,7 +103,8 @@ impl AircraftReport<'_> {
                 reason: String::new(),
                 sentence: format!("To correct before a flight: {first}."),
                 details: rest.iter().cloned().chain(details).collect(),
-                next: format!("greylag aircraft check --model {}", self.model_file),
+                before_next: String::new(),
+                next: format!("greylag aircraft check --model {model}"),
             },
         }
     }

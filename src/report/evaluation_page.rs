@@ -44,7 +44,15 @@ impl EvaluationReport<'_> {
         sections.push(self.scores());
         sections.retain(|s| !s.figures.is_empty());
         sections.push(self.provenance());
-        Page { title: "Controllers".into(), subtitle: self.subtitle.clone(), sections }
+        Page { title: "Controllers".into(), subtitle: self.subtitle(), sections }
+    }
+
+    /// The subtitle, with the name of the model if all controllers share it.
+    fn subtitle(&self) -> String {
+        match only_model(self.evaluations) {
+            Some(model) => format!("{}; model {model}", self.subtitle),
+            None => self.subtitle.clone(),
+        }
     }
 
     /// Section with the summary in sentences.
@@ -52,8 +60,8 @@ impl EvaluationReport<'_> {
         let plain = |sentence: String| Finding { sentence, link: None };
         let mut lead: Vec<Finding> =
             answer::sentences(self.evaluations).into_iter().map(plain).collect();
-        // the first two sentences, on tracking and on the envelope, are prominent
-        let rest = lead.split_off(lead.len().min(2));
+        // the first sentence, on the best controller, is prominent
+        let rest = lead.split_off(lead.len().min(1));
         let next = self.next.clone();
         match lead.is_empty() {
             true => Section::default(),
@@ -72,7 +80,7 @@ impl EvaluationReport<'_> {
             for e in self.evaluations {
                 let Some(score) = e.score(group) else { continue };
                 let ours = Value { value: score.iqm_deg, ci95: score.iqm_ci95_deg };
-                rows.push(whisker(label(e), Style::Actual, ours));
+                rows.push(whisker(label(e, self.evaluations), Style::Actual, ours));
                 if let Some(p) = published(&e.controller, group) {
                     let name = format!("{} in the paper", p.controller);
                     rows.push(whisker(name, Style::Measured, p.iqm_deg));
@@ -116,7 +124,7 @@ impl EvaluationReport<'_> {
                 let paper = published(&e.controller, &s.targets);
                 let of = |get: &dyn Fn(&Published) -> String| paper.map_or_else(|| "–".into(), get);
                 table.push([
-                    label(e),
+                    label(e, self.evaluations),
                     s.targets.replace('_', " "),
                     s.count.to_string(),
                     with_interval(s.median_deg, s.median_ci95_deg),
@@ -150,7 +158,7 @@ impl EvaluationReport<'_> {
                 for (k, (e, flight)) in self.evaluations.iter().zip(flights).enumerate() {
                     let values =
                         flight.attitude.iter().map(|angles| angles[axis].to_degrees()).collect();
-                    series.push(Series::new(&label(e), Style::nth(k), values));
+                    series.push(Series::new(&label(e, self.evaluations), Style::nth(k), values));
                 }
                 let band = Band { around: 0, half_width: 5.0, label: "within".into() };
                 Panel { bands: vec![band], ..Panel::new(title, "°", series) }
@@ -189,7 +197,7 @@ impl EvaluationReport<'_> {
                     .collect();
                 let mut figures: Vec<Figure> = sights.iter().flat_map(Sight::fans).collect();
                 figures.push(Figure::Table(phases(&sights)));
-                let name = format!("{}, {}", label(e), name(target));
+                let name = format!("{}, {}", label(e, self.evaluations), name(target));
                 options.push(ChoiceOption { name, figures });
             }
         }
@@ -209,9 +217,19 @@ impl EvaluationReport<'_> {
     }
 }
 
-/// Name of a controller with the name of its model or policy.
-fn label(e: &Evaluation) -> String {
-    if e.model == "-" { e.controller.clone() } else { format!("{} ({})", e.controller, e.model) }
+/// Name of a controller, with the name of its model or policy if `all` have several.
+fn label(e: &Evaluation, all: &[Evaluation]) -> String {
+    match e.model == "-" || only_model(all).is_some() {
+        true => e.controller.clone(),
+        false => format!("{} ({})", e.controller, e.model),
+    }
+}
+
+/// The model or policy that all controllers share, except those that need none; `None` if there are several.
+fn only_model(all: &[Evaluation]) -> Option<&str> {
+    let mut models = all.iter().map(|e| e.model.as_str()).filter(|model| *model != "-");
+    let first = models.next()?;
+    models.all(|model| model == first).then_some(first)
 }
 
 fn name(target: &Target) -> String {
@@ -270,18 +288,31 @@ mod tests {
             answer::sentences(&[evaluated("hybrid", a), evaluated("lqi", b)])
         };
         let said = answer([0.25, 0.1]);
-        assert!(
-            said[0].starts_with(
-                "Best: lqi (exact <model>): settled error 0.100° on average over 8 targets"
-            ),
-            "{said:?}"
+        assert_eq!(
+            said,
+            [
+                "Best: lqi. It stays in the envelope in all 8 flights and settles on average within 0.100° of the command \
+                 (95 %: 0.100 to 0.100°).",
+                "Its worst target: roll +10°, pitch +5°, settled error 0.100°.",
+                "Behind it: hybrid 0.250°.",
+                "No target was lost."
+            ]
         );
-        assert!(said[0].ends_with("; next hybrid (exact <model>) 0.250°."), "{said:?}");
-        assert!(said.iter().any(|s| s == "No target was lost."), "{said:?}");
-        assert!(said.iter().any(|s| s.starts_with("Envelope kept: lqi")), "{said:?}");
         let alike = answer([0.1, 0.1]);
-        assert!(alike[0].contains("not distinguished by these targets from"), "{alike:?}");
+        assert_eq!(alike[2], "Not distinguished from it by these targets: lqi 0.100°.");
         assert!(answer::sentences(&[]).is_empty());
+        let alone = answer::sentences(&[evaluated("lqi", 0.1)]);
+        assert!(alone[0].starts_with("lqi stays in the envelope"), "{alone:?}");
+    }
+
+    #[test]
+    fn controllers_are_named_with_their_models_if_these_differ() {
+        let mut all = [evaluated("lqi", 0.1), evaluated("pid", 0.2), evaluated("lqi", 0.3)];
+        all[1].model = "-".into();
+        assert_eq!(all.iter().map(|e| label(e, &all)).collect::<Vec<_>>(), ["lqi", "pid", "lqi"]);
+        all[2].model = "prior".into();
+        let named: Vec<String> = all.iter().map(|e| label(e, &all)).collect();
+        assert_eq!(named, ["lqi (exact <model>)", "pid", "lqi (prior)"]);
     }
 
     #[test]
@@ -292,16 +323,8 @@ mod tests {
         }
         assert_eq!(answer::best(&all).unwrap().controller, "hybrid-ilqr");
         let said = answer::sentences(&all);
-        assert!(
-            said[0].starts_with("Best of those that keep the envelope: hybrid-ilqr"),
-            "{said:?}"
-        );
-        assert!(
-            said[0].ends_with(
-                "since they leave the envelope more often: lqi (exact <model>) 0.00200°."
-            ),
-            "{said:?}"
-        );
+        assert!(said[0].starts_with("Best: hybrid-ilqr. It stays"), "{said:?}");
+        assert_eq!(said[2], "Behind it: lqi 0.00200°, but outside the envelope in 4 of 8.");
         // a controller that leaves the envelope in up to one flight in twenty keeps its rank
         all[0].groups.iter_mut().for_each(|s| s.kept_rate = 0.96);
         assert_eq!(answer::best(&all).unwrap().controller, "lqi");
@@ -350,10 +373,10 @@ mod tests {
         };
         let html = page.page().render();
         for part in [
-            "hybrid (exact &lt;model&gt;)",
+            "Flown in JSBSim; model exact &lt;model&gt;",
             "hybrid in the paper",
             "Next: <code>greylag demo --controller lqi</code>",
-            "<p>Envelope kept: lqi",
+            "<p>Best: lqi. It stays in the envelope in all",
             "0.440 [0.410, 0.490]",
             "Roll seen ahead at 0.10 s",
             "plan flown",

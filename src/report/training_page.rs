@@ -268,16 +268,16 @@ fn map(residual_map: &ResidualMap) -> Section {
         (0..=count).map(|k| low - half + 2.0 * half * k as f64).collect()
     };
     let [half_alpha, half_beta] = greylag_learn::dynamics::residual_map::HALF_CELL_DEG;
-    let x_edges = edges(&|c| c.beta_deg, half_beta);
-    let y_edges = edges(&|c| c.alpha_deg, half_alpha);
+    let x_edges = edges(&|c| c.alpha_deg, half_alpha);
+    let y_edges = edges(&|c| c.beta_deg, half_beta);
     let most = residual_map.map.iter().map(|c| c.norm).fold(0.0, f64::max);
     if most <= 0.0 || x_edges.is_empty() {
         return Section::default();
     }
     let place = |edges: &[f64], x: f64| edges.iter().filter(|e| **e < x).count().saturating_sub(1);
     let cells = residual_map.map.iter().map(|c| HeatCell {
-        x: place(&x_edges, c.beta_deg),
-        y: place(&y_edges, c.alpha_deg),
+        x: place(&x_edges, c.alpha_deg),
+        y: place(&y_edges, c.beta_deg),
         value: c.norm,
         samples: c.samples,
         supported: true,
@@ -285,8 +285,8 @@ fn map(residual_map: &ResidualMap) -> Section {
     let cells = cells.collect();
     let figure = HeatMap {
         title: "Size of the residual over the flow angles".into(),
-        x_label: "Sideslip (°)".into(),
-        y_label: "Angle of attack (°)".into(),
+        x_label: "Angle of attack α (°)".into(),
+        y_label: "Sideslip β (°)".into(),
         unit: "1/s".into(),
         limit: most,
         x_edges,

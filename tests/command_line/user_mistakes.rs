@@ -291,12 +291,7 @@ const MORE: [Mistake; 20] = [
     (
         "amend --model @/model.toml --log @/good.csv --accept --out @/new",
         1,
-        &[
-            "no effect is asserted",
-            "two thirds of good.csv",
-            "diagnose --model",
-            "--tune-only --out",
-        ],
+        &["no effect is asserted", "two thirds of good.csv", "diagnose --model", "--tune-only"],
     ),
     (
         "amend --model @/model.toml --log @/good.csv --diagnosis @/there.json --out @/new",

@@ -233,7 +233,7 @@ fn the_box_says_where_the_tuned_model_fails() {
         "{none}"
     );
     assert!(none.find(&answer.effect) < none.find(&answer.error));
-    assert!(none.contains("The nearest suspects, none of them shown"));
+    assert!(none.contains("Nearest suspects, none proven"));
 }
 
 /// The parameter on which the flights differ most stands first, whatever its place in the effect.

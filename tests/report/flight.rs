@@ -177,7 +177,10 @@ fn the_first_sentence_says_how_the_envelope_was_kept() {
     // 3.0 is beyond 2.9 by less than a twentieth: outside for as long, and yet kept
     let all = report.segments.len();
     let (outcome, sentence) = verdict(&report);
-    assert!(sentence.starts_with(&format!("Tracked {} of {all}", report.tracked())), "{sentence}");
+    assert!(
+        sentence.contains(&format!(" {} of {all} targets; slowest to roll ", report.tracked())),
+        "{sentence}"
+    );
     assert_eq!(outcome == Outcome::Missed, report.tracked() < all);
     let html = report.page().render();
     assert!(html.contains("Integral of error (° s)") && html.contains("2.90"));
@@ -192,21 +195,28 @@ fn the_first_sentence_says_what_happened() {
         settled(Difficulty::Easy, 0.04),
         settled(Difficulty::Hard, 0.05),
     ];
-    // Means: (0.02 + 0.04) / 2 easy, 0.05 hard; the tolerance is 0.5°, the longest cycle 1 ms.
-    let sentence = "Tracked 3 of 3 targets; settled error 0.03° easy, 0.05° hard; no late cycle.";
-    assert_eq!(verdict(&report), (Outcome::Reached, sentence.into()));
+    // a target of 0.1 rad in roll; the tolerance is 0.5°, the longest cycle 1 ms
+    let worst = "largest settled error 0.05°, at roll +6°, pitch 0°.";
+    let sentence = format!("Flew as commanded: 3 of 3 targets; {worst}");
+    assert_eq!(verdict(&report), (Outcome::Reached, sentence));
+    // means: (0.02 + 0.04) / 2 easy, 0.05 hard
+    let line = report.page_sentence();
+    let beside =
+        ["; mean settled error 0.03° easy, 0.05° hard", "; no late cycle of the companion"];
+    assert!(beside.iter().all(|part| line.contains(part)), "{line}");
 
     report.segments[2].settled_error_rad = f64::NAN;
-    let sentence = "Tracked 2 of 3 targets; settled error 0.03° easy; no late cycle.";
-    assert_eq!(verdict(&report), (Outcome::Missed, sentence.into()));
+    let sentence = format!("Tracked 2 of 3 targets; {}", worst.replace("0.05", "0.04"));
+    assert_eq!(verdict(&report), (Outcome::Missed, sentence));
 
     report.segments.truncate(2);
     // One cycle just over the budget of 10 ms, one exactly at it.
     let cycles = &mut report.timing.as_mut().unwrap().cycles;
     cycles.push(Cycle { time_s: 60.0, duration_us: 10_000.1 });
     cycles.push(Cycle { time_s: 60.01, duration_us: 10_000.0 });
-    let sentence = "Tracked 2 of 2 targets; settled error 0.03° easy; 1 late cycle.";
-    assert_eq!(verdict(&report), (Outcome::Missed, sentence.into()));
+    let sentence = format!("Flew as commanded: 2 of 2 targets; {}", worst.replace("0.05", "0.04"));
+    assert_eq!(verdict(&report), (Outcome::Missed, sentence));
+    assert!(report.page_sentence().contains("; 1 late cycle of the companion"));
 
     report.timing = None;
     assert_eq!(verdict(&report).0, Outcome::Open, "a loop that was not timed may have been late");
@@ -220,7 +230,7 @@ fn a_flight_without_samples_is_still_a_page() {
     let html = report.page().render();
     assert_well_formed(&html);
     // no cycle was timed: the page must not say that none was late
-    assert!(html.contains("loop timing was not recorded") && !html.contains("no late cycle"));
+    assert!(html.contains("Loop timing was not recorded") && !html.contains("no late cycle"));
     assert!(!html.contains("NaN ms"));
 
     let broken = Flight::from(vec![Sample::default(); 3]);

@@ -250,7 +250,7 @@ fn every_number_of_the_box_is_recomputed_from_the_flights() {
 
     // a flight that was fitted is called so
     let said = greylag(&["compare", "--model", MODEL, after.to_str().unwrap(), "--log", log(0)]);
-    assert!(said.starts_with("On 1 flight, fitted, the error"), "{said}");
+    assert!(said.starts_with("On the flight that it was fitted to, the error"), "{said}");
 }
 
 #[test]
@@ -278,7 +278,10 @@ fn a_diagnosis_begins_with_its_answer_and_ends_with_the_next_command() {
     let answer = &told["answer"];
     assert!(said.starts_with(answer["error"].as_str().unwrap()), "{said}");
     assert!(
-        answer["error"].as_str().unwrap().starts_with("On 2 flights, fitted, the error at 5 s")
+        answer["error"]
+            .as_str()
+            .unwrap()
+            .starts_with("On the 2 flights that it was fitted to, the error at 5 s")
     );
     all_in_json(answer);
     let given = GreyBox::load(MODEL.as_ref()).unwrap();

@@ -193,7 +193,7 @@ impl fmt::Display for Summary {
              Frames: {} ({} repeated, {} dropped on purpose, {} without anybody to send to). \
              Answers: {} ({} stale, {} repeated, {} with a wrong time, {} unusable, {} limited; \
              {} steps without a new one). Frame to answer: {:.2} ms median, {:.2} ms p99, {:.2} ms \
-             at most. Late cycles: {} (at most {:.2} ms late). Bad frames: {}, foreign: {}.",
+             at most. Late cycles of the simulator: {} (at most {:.2} ms late). Bad frames: {}, foreign: {}.",
             self.simulated_s,
             self.flown_s,
             self.wall_s,

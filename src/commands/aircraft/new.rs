@@ -8,6 +8,7 @@ use clap::ValueEnum;
 
 use crate::commands::files::{self, Overwrite};
 use crate::control::aircraft_check;
+use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::model::plausible::Size;
 use crate::model::textbook::{Measures, Tail};
@@ -86,8 +87,9 @@ pub fn write(folder: &Path, airframe: &str, model_text: &str) -> Result<ExitCode
     let found = aircraft_check::check(&GreyBox::load(&model)?)?;
     super::check::print(&found);
     println!(
-        "fly it, then fit it: greylag amend --model {} --log FLIGHTS --tune-only --out FOLDER",
-        model.display()
+        "fly it, then fit it (FLIGHTS: the logs of its flights; FOLDER: a new folder): greylag amend --model {} --log \
+         FLIGHTS --tune-only --out FOLDER",
+        quoted(&model)
     );
     Ok(super::check::status(&found))
 }

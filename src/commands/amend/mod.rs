@@ -7,6 +7,7 @@ mod given;
 mod leave_one_out;
 mod places;
 mod tables;
+mod unasserted;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -31,7 +32,7 @@ use crate::physics::catalogue;
 use crate::report::AmendmentReport;
 use crate::sysid::amend::{self, Added, Amended, Amendment, Prior, Refused};
 use crate::sysid::compare::{self, compare};
-use crate::sysid::diagnose::{self, Diagnosis, diagnose};
+use crate::sysid::diagnose::{self, diagnose};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::progress::{Progress, Stage, part};
@@ -316,31 +317,7 @@ fn divided(arguments: &Arguments) -> (Vec<PathBuf>, Vec<PathBuf>) {
     }
 }
 
-/// Error message if the diagnosis of the fitted flights asserts no effect. It states the verdict of the diagnosis and the
-/// commands to run next.
-fn nothing_asserted(
-    arguments: &Arguments,
-    diagnosis: &Diagnosis,
-    flights: &[Reconstruction],
-) -> String {
-    let names = flights.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
-    let alone = flights.len() == 1 && arguments.hold_out.is_empty() && !arguments.fit_all;
-    let of = match alone && arguments.logs.paths.len() == 1 {
-        true => format!("the first two thirds of {names}; the rest is held out"),
-        false => names,
-    };
-    let said = diagnosis.sentences.first().map_or("", String::as_str);
-    let said = said.split(": ").next().unwrap_or_default().trim_end_matches('.');
-    let given = format!("--model {}{}", quoted(&arguments.model), arguments.logs.words());
-    format!(
-        "no effect is asserted, so there is none to accept ({of}): {said}\n  \
-         to see why: greylag diagnose {given} --report diagnosis.html\n  \
-         to fit the model's own coefficients alone: greylag amend {given} --tune-only --out {}",
-        quoted(&arguments.out)
-    )
-}
-
-/// The effects to add: those asserted by a diagnosis, then those named by `--effect`.
+/// The effects to add: those asserted by a diagnosis, then those named by options.
 fn wanted(
     arguments: &Arguments,
     effects: &[String],
@@ -355,7 +332,7 @@ fn wanted(
         let diagnosis = diagnose(model, flights, &options, &|stage| bar.update(stage))?;
         all.extend(diagnosis.effects.iter().filter(|c| c.asserted).map(Added::of));
         if all.is_empty() {
-            bail!(nothing_asserted(arguments, &diagnosis, flights));
+            bail!(unasserted::message(arguments, &diagnosis));
         }
     }
     if let Some(path) = &arguments.diagnosis {

@@ -19,16 +19,12 @@ const OF_OTHERS: usize = 2;
 pub fn comparison_page(report: &ComparisonReport) -> Page {
     let c = report.comparison;
     let answer = c.answer.clone();
-    let boxed = AnswerBox { answer, place: place::of_models(&c.models), first: First::Error };
+    let boxed = AnswerBox { answer, place: place::of_comparison(c), first: First::Error };
     let answer = Figure::Answer(Box::new(boxed));
     // with a single model no sentence is prominent, because the answer box already names the worst channel
     let leading = if c.models.len() == 1 { 0 } else { LEADING };
-    let mut said = findings(c, leading);
-    if let [only] = &c.models[..] {
-        worst_first(&mut said.rest, only);
-    }
-    let words = Figure::Findings(said);
-    // a single model's sentences follow the answer box; those of several models come after the figures
+    let words = Figure::Findings(findings(c, leading));
+    // the page of a single model begins with its failures, that of several models with their differences
     let (first, later) = match c.models.len() {
         0 | 1 => (vec![answer, words], Section::default()),
         _ => (vec![answer], Section::new("In words", "", vec![words])),
@@ -93,14 +89,14 @@ pub(crate) fn channel_name(id: ChannelId) -> String {
     format!("{} {}", id.symbol(), id.name())
 }
 
-/// The sentences on all models. The first `leading` sentences on the first model are prominent.
+/// The sentences on all models, the worst channels first. The first `leading` on the first model are prominent.
 fn findings(c: &Comparison, leading: usize) -> Findings {
     let mut lead = Vec::new();
     let mut rest = Vec::new();
     for (k, model) in c.models.iter().enumerate() {
         let own = if k == 0 { usize::MAX } else { OF_OTHERS };
-        for (i, sentence) in model.sentences.iter().take(own).enumerate() {
-            let finding = Finding { sentence: sentence.clone(), link: link(model, sentence) };
+        for (i, said) in model.sentences_worst_first().into_iter().take(own).enumerate() {
+            let finding = Finding { sentence: said.into(), link: link(model, said) };
             match (k, i < leading) {
                 (0, true) => lead.push(finding),
                 (0, false) => rest.push(finding),
@@ -118,17 +114,7 @@ fn findings(c: &Comparison, leading: usize) -> Findings {
     Findings { lead, rest, ..Findings::default() }
 }
 
-/// Moves the sentence on the channel that the answer box names to the front of `sentences`.
-fn worst_first(sentences: &mut [Finding], model: &ModelResult) {
-    let Some((channel, _)) = place::worst(model) else { return };
-    let name = channel_name(channel);
-    let own = |finding: &Finding| finding.link.as_ref().is_some_and(|link| link.option == name);
-    if let Some(k) = sentences.iter().position(own) {
-        sentences[..=k].rotate_right(1);
-    }
-}
-
-/// A link to the figure with the regimes of the channel whose worst regime `sentence` describes; `None` if it describes none.
+/// Link to the regimes of the channel whose worst regime `sentence` describes.
 fn link(model: &ModelResult, sentence: &str) -> Option<Link> {
     let plain = |text: &str| text.trim_end_matches('.').to_lowercase();
     let of = model.channels.iter().find(|ch| plain(&ch.worst_regime) == plain(sentence))?;
@@ -140,16 +126,20 @@ pub(crate) fn keys(c: &Comparison) -> Vec<(String, Style)> {
     c.models.iter().enumerate().map(|(i, m)| (m.name.clone(), Style::nth(i))).collect()
 }
 
+/// Bars of the unexplained shares, the worst channels of the first model first.
 pub(crate) fn unexplained(c: &Comparison) -> Figure {
     let share = |model: &ModelResult, id: ChannelId| {
         let of = model.channels.iter().find(|ch| ch.channel == id);
         of.map_or(f64::NAN, |ch| 100.0 * ch.unexplained_fraction)
     };
-    let seen =
-        |id: &ChannelId| c.models.iter().any(|m| m.channels.iter().any(|x| x.channel == *id));
-    let groups: Vec<BarGroup> = ChannelId::ALL
+    let mut seen: Vec<ChannelId> = Vec::new();
+    for id in c.models.iter().flat_map(ModelResult::worst_first).map(|ch| ch.channel) {
+        if !seen.contains(&id) {
+            seen.push(id);
+        }
+    }
+    let groups: Vec<BarGroup> = seen
         .into_iter()
-        .filter(seen)
         .map(|id| BarGroup {
             label: channel_name(id),
             values: c.models.iter().map(|m| share(m, id)).collect(),

@@ -1,39 +1,112 @@
-//! Sentence on the channel (force, moment or rate) with the largest unexplained share. This share is the variance of the
-//! residual without noise, as a fraction of the measured variance without noise.
+//! Sentence for the answer box on where the model fails, or where the effect acts that was added to it.
 
 use crate::kit::numbers::number;
-use greylag_sysid::compare::{ChannelId, ModelResult};
+use greylag_physics::Channel;
+use greylag_physics::catalogue::describe;
+use greylag_sysid::compare::{ChannelId, Comparison, ModelResult};
 
-/// Share above which the sentence states the rms error as a multiple of the measured variation. A percentage of four or
-/// more digits would be hard to read.
+/// Share above which the sentence gives the error as a multiple of the measured variation, because a percentage of four
+/// or more digits is hard to read. The channel then hardly varies in the flights.
 const MULTIPLE: f64 = 10.0;
-
-/// Channel in which the model leaves the largest share unexplained, and this share. `None` without finite shares.
-pub(crate) fn worst(model: &ModelResult) -> Option<(ChannelId, f64)> {
-    let shares = ChannelId::ALL.into_iter().filter_map(|id| Some((id, share(model, id)?)));
-    shares.max_by(|a, b| a.1.total_cmp(&b.1))
-}
+/// Smallest share that an effect is taken to leave. Smaller shares are uncertain, and the ratio to them would be random.
+const LEAST: f64 = 1e-4;
+/// Number of channels that are forces and moments, the first of [`ChannelId::ALL`].
+const LOADS: usize = 6;
 
 fn share(model: &ModelResult, id: ChannelId) -> Option<f64> {
     let of = model.channels.iter().find(|ch| ch.channel == id);
     of.map(|ch| ch.unexplained_fraction).filter(|share| share.is_finite())
 }
 
+/// Sentence for the page of the comparison `c`. For a model and its amendment with added effects, it states where they act.
+pub(crate) fn of_comparison(c: &Comparison) -> String {
+    let effects: Vec<&str> = c.answer.numbers.effects.iter().map(|e| e.id.as_str()).collect();
+    let added = match &c.models[..] {
+        [given, after] => of_added(&effects, given, None, after),
+        _ => None,
+    };
+    added.unwrap_or_else(|| of_models(&c.models))
+}
+
+/// Sentence on the channel in which the `effects` that were added to `after` reduce the unexplained share most, in
+/// proportion. The share is compared with that of the tuned model. If `tuned` is unknown, it is compared with that of the
+/// given model, in the channels in which the effects act. `None` if there is no effect or no reduction.
+pub(crate) fn of_added(
+    effects: &[&str],
+    given: &ModelResult,
+    tuned: Option<&ModelResult>,
+    after: &ModelResult,
+) -> Option<String> {
+    let ratio = |id: &ChannelId| {
+        let before = share(tuned.unwrap_or(given), *id)?;
+        let ratio = before / share(after, *id)?.max(LEAST);
+        (ratio > 1.0).then_some((*id, ratio))
+    };
+    let best = |ids: &[ChannelId]| {
+        ids.iter().filter_map(ratio).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(id, _)| id)
+    };
+    let all = ChannelId::ALL;
+    let (loads, rates) = all.split_at(LOADS);
+    let own = if tuned.is_some() { loads.to_vec() } else { acted_on(effects) };
+    let id = best(&own).or_else(|| best(loads)).or_else(|| best(rates))?;
+    let percent = |model: &ModelResult| {
+        share(model, id).map_or("–".into(), |share| number(100.0 * share.max(0.0)))
+    };
+    let (verb, it) = match effects {
+        [] => return None,
+        [_] => ("acts", "it"),
+        _ => ("act", "them"),
+    };
+    let (names, with) = (effects.join(" and "), percent(after));
+    let shares = match tuned {
+        Some(tuned) => format!(
+            "{} % unexplained when tuned, {with} % with {it} ({} % as given)",
+            percent(tuned),
+            percent(given)
+        ),
+        None => format!("{} % unexplained as given, {with} % tuned and with {it}", percent(given)),
+    };
+    Some(format!("Where {names} {verb}: {}, {shares}.", id.name()))
+}
+
+/// Channels in which the catalogue says that the effects act; empty for effects that act on the deflections.
+fn acted_on(effects: &[&str]) -> Vec<ChannelId> {
+    let entries = effects.iter().filter_map(|id| describe(id)?.entry);
+    let of = |channel: &Channel| match channel {
+        Channel::Drag | Channel::BodyX => ChannelId::Drag,
+        Channel::Lift => ChannelId::Lift,
+        Channel::Side => ChannelId::Side,
+        Channel::Roll => ChannelId::Roll,
+        Channel::Pitch => ChannelId::Pitch,
+        Channel::Yaw => ChannelId::Yaw,
+    };
+    entries.flat_map(|entry| entry.channels.iter().map(of)).collect()
+}
+
 /// Sentence on the channel in which the first model leaves the largest share unexplained. It includes the shares that the other
 /// models leave in this channel. Empty without finite shares.
 pub(crate) fn of_models(models: &[ModelResult]) -> String {
     let Some((first, rest)) = models.split_first() else { return String::new() };
-    let Some((channel, left)) = worst(first) else { return String::new() };
+    let channels = first.worst_first();
+    let mut shares = channels.iter().filter_map(|c| Some((c.channel, share(first, c.channel)?)));
+    let Some((channel, left)) = shares.next() else { return String::new() };
     let name = channel.name();
     let all: Vec<String> = models
         .iter()
         .filter_map(|m| Some(format!("{} % by {}", number(100.0 * share(m, channel)?), m.name)))
         .collect();
     match rest {
-        [] if left > MULTIPLE => format!(
-            "Where it fails: most in {name}, whose error is {} times the measured variation (rms).",
-            number(left.sqrt())
-        ),
+        [] if left > MULTIPLE => {
+            let lively = shares.find(|(_, share)| *share <= MULTIPLE);
+            let lively = lively.map_or(String::new(), |(id, share)| {
+                format!("; of the livelier channels {}, {} %", id.name(), number(100.0 * share))
+            });
+            format!(
+                "Where it fails: most in {name}, {} times its variation, which is tiny in these flights (a quiet \
+                 axis){lively}.",
+                number(left.sqrt())
+            )
+        }
         [] => {
             let worse = if left > 1.0 { ", worse than a constant" } else { "" };
             format!(
@@ -42,5 +115,74 @@ pub(crate) fn of_models(models: &[ModelResult]) -> String {
             )
         }
         _ => format!("Where it failed: most in {name}, left unexplained: {}.", all.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ChannelId::{Alpha, Lift, Pitch, Roll, Yaw};
+    use greylag_sysid::compare::{ChannelResult, Map};
+
+    fn model(name: &str, shares: &[(ChannelId, f64)]) -> ModelResult {
+        let channel = |&(channel, unexplained_fraction): &(ChannelId, f64)| ChannelResult {
+            channel,
+            name: channel.name(),
+            unit: channel.unit(),
+            windows: 1,
+            measured_sd: 1.0,
+            residual_rms: 1.0,
+            noise_sd: 0.0,
+            unexplained_fraction,
+            effect_per_s: 0.0,
+            offset_share: 0.0,
+            worst_regime: String::new(),
+            abstained: None,
+            regime: None,
+            bins: Vec::new(),
+            map: Map { alpha_deg: Vec::new(), beta_deg: Vec::new(), cells: Vec::new() },
+        };
+        ModelResult {
+            name: name.into(),
+            sentences: Vec::new(),
+            free_run: Vec::new(),
+            known: None,
+            growth: Vec::new(),
+            channels: shares.iter().map(channel).collect(),
+            traces: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn an_added_effect_acts_where_it_takes_most_away() {
+        let given = model("given", &[(Lift, 0.5), (Roll, 2.93), (Alpha, 9.0)]);
+        let tuned = model("tuned", &[(Lift, 0.02), (Roll, 0.38), (Alpha, 8.0)]);
+        let after = model("after", &[(Lift, 0.02), (Roll, 0.0009), (Alpha, 0.0)]);
+        assert_eq!(
+            of_added(&["propwash"], &given, Some(&tuned), &after).unwrap(),
+            "Where propwash acts: rolling moment, 38.0 % unexplained when tuned, 0.0900 % with it (293 % as given)."
+        );
+        // without the tuned model the catalogue says where the effect acts
+        let given = model("given", &[(Lift, 0.5), (Roll, 2.93)]);
+        let after = model("after", &[(Lift, 0.1), (Roll, 0.0009)]);
+        assert_eq!(
+            of_added(&["lift_stall"], &given, None, &after).unwrap(),
+            "Where lift_stall acts: lift, 50.0 % unexplained as given, 10.0 % tuned and with it."
+        );
+        assert_eq!(of_added(&[], &given, None, &after), None);
+        assert_eq!(of_added(&["lift_stall"], &given, Some(&given), &given), None);
+    }
+
+    #[test]
+    fn a_quiet_axis_is_named_with_the_worst_livelier_channel() {
+        let quiet = model("m", &[(Lift, 0.1), (Pitch, 723.61), (Yaw, 2.02), (Alpha, 5.0)]);
+        assert_eq!(
+            of_models(&[quiet]),
+            "Where it fails: most in pitching moment, 26.9 times its variation, which is tiny in these flights (a quiet \
+             axis); of the livelier channels yawing moment, 202 %."
+        );
+        // the rates are named only in the place of forces
+        let rates = model("m", &[(Lift, 0.1), (Alpha, 5.0)]);
+        assert!(of_models(&[rates]).contains("most in lift, 10.0 % unexplained"));
     }
 }

@@ -5,14 +5,16 @@ use crate::kit::numbers::number;
 use greylag_sysid::compare::ChannelId;
 use greylag_sysid::diagnose::{Candidate, ChannelLeft, Diagnosis, Verdict};
 
-/// The sentence. It names for each asserted effect (one that the model lacks according to the diagnosis) the channel, and the
-/// variable with which the residual of the channel varies. If no effect is asserted, or none has such a curve, it names the
-/// channel of which the tuned model leaves the largest share unexplained.
+/// Share of a channel below which little of it is unexplained: the model does not fail there.
+const LITTLE: f64 = 0.01;
+
+/// Sentence on the channel of each asserted effect, with the variable that shows the effect. Without an asserted effect, the
+/// sentence is on the channel with the largest share that is unexplained after tuning.
 pub(crate) fn of_diagnosis(d: &Diagnosis) -> String {
     let asserted: Vec<&Candidate> = d.effects.iter().filter(|c| c.asserted).collect();
-    let places: Vec<String> = asserted.iter().filter_map(|c| of_effect(d, c)).collect();
+    let places: Vec<Place> = asserted.iter().filter_map(|c| of_effect(d, c)).collect();
     if !places.is_empty() {
-        return format!("Where it fails: {}.", places.join("; "));
+        return of_effects(&places);
     }
     let share = |ch: &&ChannelLeft| ch.tuned_unexplained_fraction.is_finite();
     let by_share = |a: &&ChannelLeft, b: &&ChannelLeft| {
@@ -33,18 +35,45 @@ pub(crate) fn of_diagnosis(d: &Diagnosis) -> String {
     }
 }
 
-/// Text on the asserted effect `c`, such as "pitching moment, with elevator movement (tuned 28 % unexplained, with backlash
-/// 0.3 %)". `None` if the effect has no curve.
-fn of_effect(d: &Diagnosis, c: &Candidate) -> Option<String> {
+/// Place in which an effect acts.
+struct Place {
+    /// Text such as "pitching moment, with elevator movement (tuned 28 % unexplained, with backlash 0.3 %)".
+    text: String,
+    /// Whether the tuned model leaves little of the channel unexplained.
+    little: bool,
+}
+
+/// Sentence on the places of the asserted effects, of which there is at least one.
+fn of_effects(places: &[Place]) -> String {
+    let begin = match (places.iter().all(|place| place.little), places.len()) {
+        (true, 1) => "Where the effect acts",
+        (true, _) => "Where the effects act",
+        _ => "Where it fails",
+    };
+    let all: Vec<&str> = places.iter().map(|place| place.text.as_str()).collect();
+    format!("{begin}: {}.", all.join("; "))
+}
+
+/// The place of the effect `c`; `None` without its curve.
+fn of_effect(d: &Diagnosis, c: &Candidate) -> Option<Place> {
     let curve = c.curve.as_ref()?;
-    let mut text = format!("{}, with {}", name(&curve.channel), plain(&curve.variable));
     let left = d.channels.iter().find(|ch| ch.channel == curve.channel);
     let shares = left.map(|ch| [ch.tuned_unexplained_fraction, ch.unexplained_fraction]);
-    if let Some([tuned, after]) = shares.filter(|all| all.iter().all(|x| x.is_finite())) {
-        let [tuned, after] = [tuned, after].map(|share| number(100.0 * share));
-        text += &format!(" (tuned {tuned} % unexplained, with {} {after} %)", c.id);
-    }
-    Some(text)
+    let shares = shares.filter(|all| all.iter().all(|x| x.is_finite()));
+    let text = format!("{}, with {}", name(&curve.channel), plain(&curve.variable));
+    Some(placed(text, shares, &c.id))
+}
+
+/// The place `text` with the shares of its channel that are unexplained, tuned and with the effect `id`, if they are known.
+fn placed(text: String, shares: Option<[f64; 2]>, id: &str) -> Place {
+    let Some([tuned, after]) = shares else { return Place { text, little: false } };
+    let little = tuned < LITTLE;
+    let [tuned, after] = [tuned, after].map(|share| number(100.0 * share));
+    let beside = match little {
+        true => format!("little of it: {tuned} % → {after} % unexplained"),
+        false => format!("tuned {tuned} % unexplained, with {id} {after} %"),
+    };
+    Place { text: format!("{text} ({beside})"), little }
 }
 
 /// The name in words of the channel with this `symbol`; `symbol` itself if there is none.
@@ -64,6 +93,22 @@ pub(crate) fn plain(variable: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_channel_of_which_little_is_unexplained_is_no_failure() {
+        let of = |shares| placed("lift, with angle of attack".into(), Some(shares), "lift_stall");
+        let (little, much) = ([0.00073, 0.00058], [0.282, 0.003]);
+        assert_eq!(
+            of_effects(&[of(little)]),
+            "Where the effect acts: lift, with angle of attack (little of it: 0.0730 % → 0.0580 % unexplained)."
+        );
+        assert_eq!(
+            of_effects(&[of(much)]),
+            "Where it fails: lift, with angle of attack (tuned 28.2 % unexplained, with lift_stall 0.300 %)."
+        );
+        assert!(of_effects(&[of(little), of(much)]).starts_with("Where it fails: "));
+        assert!(of_effects(&[of(little), of(little)]).starts_with("Where the effects act: "));
+    }
 
     #[test]
     fn a_variable_is_named_without_its_unit() {

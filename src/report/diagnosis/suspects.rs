@@ -126,7 +126,7 @@ pub(crate) fn curves(d: &Diagnosis) -> Section {
     // the title must not present candidates that are not asserted as findings
     let title = match d.effects.iter().any(|c| c.asserted) {
         true => "The effect",
-        false => "The nearest suspects, none of them shown",
+        false => "Nearest suspects, none proven",
     };
     Section::new(title, &note, vec![Figure::Choice(choice)])
 }

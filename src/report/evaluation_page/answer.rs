@@ -1,8 +1,4 @@
-//! Sentences that answer which controller is best in an evaluation: the ranking, the envelope, lost targets, and the weakest
-//! group of targets.
-//!
-//! Controllers are ranked by the settled error, which is the attitude error that remains at the end of a flight to a target. A
-//! flight keeps the envelope if load factor and angle of attack stay within their limits.
+//! Sentences of an evaluation's answer: the best controller, its worst target, the other controllers, lost targets.
 
 use super::label;
 use crate::kit::numbers::number;
@@ -14,16 +10,18 @@ const ALL: &str = "all";
 /// one: one flight in twenty. A small settled error does not compensate for a load factor beyond the limit.
 const KEPT_APART: f64 = 0.05;
 
-/// The evaluation of the controller that ranks first; `None` if there are no scores.
+/// An evaluation with its score over the ranked group.
+type Ranked<'a> = (&'a Evaluation, &'a Score);
+
+/// The evaluation that ranks first; `None` if there are no scores.
 pub fn best(evaluations: &[Evaluation]) -> Option<&Evaluation> {
     let [keeping, _] = ranked(evaluations, &ranked_over(evaluations)?);
     keeping.first().map(|(e, _)| *e)
 }
 
-/// Evaluations with their scores over `group`. The first list has the controllers that keep the envelope often enough, the
-/// second the others. Each list is sorted by the mean settled error.
-fn ranked<'a>(evaluations: &'a [Evaluation], group: &str) -> [Vec<(&'a Evaluation, &'a Score)>; 2] {
-    let mut all: Vec<(&Evaluation, &Score)> =
+/// Evaluations with their scores over `group`, sorted by settled error: first those that keep the envelope, then the others.
+fn ranked<'a>(evaluations: &'a [Evaluation], group: &str) -> [Vec<Ranked<'a>>; 2] {
+    let mut all: Vec<Ranked> =
         evaluations.iter().filter_map(|e| Some((e, e.score(group)?))).collect();
     all.sort_by(|(_, a), (_, b)| a.mean_deg.total_cmp(&b.mean_deg));
     let most = all.iter().map(|(_, s)| s.kept_rate).fold(f64::NAN, f64::max);
@@ -32,28 +30,24 @@ fn ranked<'a>(evaluations: &'a [Evaluation], group: &str) -> [Vec<(&'a Evaluatio
     [keeping, leaving]
 }
 
-/// The sentences of the answer, beginning with the ranking; empty if there are no scores.
+/// The sentences of the answer: the best controller, its worst target, the other controllers, lost targets. Empty if there are
+/// no scores.
 pub fn sentences(evaluations: &[Evaluation]) -> Vec<String> {
     let Some(group) = ranked_over(evaluations) else { return Vec::new() };
     let [keeping, leaving] = ranked(evaluations, &group);
     let Some((best, rest)) = keeping.split_first() else { return Vec::new() };
-    let mut all = vec![ranking(*best, rest, &leaving)];
     let ranked = [&keeping[..], &leaving[..]].concat();
-    let measured = ranked.iter().any(|(_, score)| score.kept_rate.is_finite());
-    if measured {
-        all.push(format!(
-            "Envelope kept: {}.",
-            each(&ranked, |s| format!("in {} of the flights", percent(s.kept_rate)))
-        ));
-    }
+    let mut all = vec![leader(evaluations, *best, ranked.len() == 1)];
+    all.extend(worst_target(best.0));
+    all.extend(followers(evaluations, *best, rest, &leaving));
     all.push(match ranked.iter().all(|(_, s)| s.divergence_rate == 0.0) {
         true => "No target was lost.".into(),
-        false => format!(
-            "Targets lost (over 10° off): {}.",
-            each(&ranked, |s| percent(s.divergence_rate))
-        ),
+        false => {
+            let lost = |(e, s): &Ranked| format!("{} {}", label(e, evaluations), percent(s));
+            let lost: Vec<String> = ranked.iter().map(lost).collect();
+            format!("Targets lost (over 10° off): {}.", lost.join(", "))
+        }
     });
-    all.extend(weakest(best.0));
     all
 }
 
@@ -65,60 +59,90 @@ fn ranked_over(evaluations: &[Evaluation]) -> Option<String> {
     Some(all.unwrap_or(most).targets.clone())
 }
 
-fn ranking(
-    (best, score): (&Evaluation, &Score),
-    rest: &[(&Evaluation, &Score)],
-    leaving: &[(&Evaluation, &Score)],
-) -> String {
+/// Sentence on the best controller: envelope and settled error. `alone` states that there is no other controller.
+fn leader(all: &[Evaluation], (best, score): Ranked, alone: bool) -> String {
+    let name = label(best, all);
+    let begin = if alone { name } else { format!("Best: {name}. It") };
+    let flights = match score.count {
+        1 => "1 flight".into(),
+        n => format!("{n} flights"),
+    };
+    let envelope = match outside(score) {
+        None => String::new(),
+        Some(0) if score.count == 1 => "stays in the envelope and ".into(),
+        Some(0) => format!("stays in the envelope in all {flights} and "),
+        Some(left) => format!("stays in the envelope in {} of {flights} and ", score.count - left),
+    };
+    let over = if envelope.is_empty() { format!(" over {flights}") } else { String::new() };
     let [low, high] = score.mean_ci95_deg.map(number);
-    let targets = match score.count {
-        1 => "1 target".into(),
-        n => format!("{n} targets"),
-    };
-    let mut text = format!(
-        "{}{}: settled error {}° on average over {targets} (95 %: {low} to {high}°)",
-        match (rest, leaving) {
-            ([], []) => "",
-            (_, []) => "Best: ",
-            _ => "Best of those that keep the envelope: ",
-        },
-        label(best),
+    format!(
+        "{begin} {envelope}settles on average{over} within {}° of the command (95 %: {low} to {high}°).",
         number(score.mean_deg)
-    );
-    if let Some(((next, other), others)) = rest.split_first() {
-        let apart = other.mean_ci95_deg[0] > score.mean_ci95_deg[1];
-        let than = if apart { "next" } else { "not distinguished by these targets from" };
-        text += &format!("; {than} {} {}°", label(next), number(other.mean_deg));
-        others.iter().for_each(|(e, s)| text += &format!(", {} {}°", label(e), number(s.mean_deg)));
+    )
+}
+
+/// Number of flights of a group that left the envelope; `None` if this was not measured.
+fn outside(score: &Score) -> Option<usize> {
+    let share = 1.0 - score.kept_rate;
+    share.is_finite().then(|| (share * score.count as f64).round() as usize)
+}
+
+/// Sentence on the target with the largest settled error; `None` if there is no group. The attitude is not stated if the
+/// single flights are unknown.
+fn worst_target(best: &Evaluation) -> Option<String> {
+    let known = best.flights.iter().filter(|f| f.settled_deg.is_finite());
+    if let Some(f) = known.max_by(|a, b| a.settled_deg.total_cmp(&b.settled_deg)) {
+        let [roll, pitch] = f.to_deg.map(whole);
+        return Some(format!(
+            "Its worst target: roll {roll}°, pitch {pitch}°, settled error {}°.",
+            number(f.settled_deg)
+        ));
     }
-    let behind = |s: &Score| format!("{}°", number(s.mean_deg));
-    if !leaving.is_empty() {
-        text += &format!(
-            "; behind it, since they leave the envelope more often: {}",
-            each(leaving, behind)
-        );
+    let groups = best.groups.iter().filter(|s| s.targets != ALL);
+    let worst = groups.max_by(|a, b| a.max_deg.total_cmp(&b.max_deg))?;
+    Some(format!("Its worst target has a settled error of {}°.", number(worst.max_deg)))
+}
+
+/// An angle rounded to a degree, with its sign.
+fn whole(deg: f64) -> String {
+    match deg.round() {
+        0.0 => "0".into(),
+        deg => format!("{deg:+.0}").replace('-', "−"),
     }
-    text + "."
 }
 
-fn each(ranked: &[(&Evaluation, &Score)], of: impl Fn(&Score) -> String) -> String {
-    let said: Vec<String> =
-        ranked.iter().map(|(e, score)| format!("{} {}", label(e), of(score))).collect();
-    said.join(", ")
+/// Sentences on the controllers behind the best one: `rest` keep the envelope as often as the best one, `leaving` do not.
+fn followers(
+    all: &[Evaluation],
+    (_, score): Ranked,
+    rest: &[Ranked],
+    leaving: &[Ranked],
+) -> Vec<String> {
+    // the intervals of controllers with about the same error overlap
+    let alike = |(_, other): &&Ranked| other.mean_ci95_deg[0] <= score.mean_ci95_deg[1];
+    let same: Vec<&Ranked> = rest.iter().filter(alike).collect();
+    let behind: Vec<&Ranked> = rest.iter().filter(|r| !alike(r)).chain(leaving).collect();
+    let error = |(e, s): &Ranked| format!("{} {}°", label(e, all), number(s.mean_deg));
+    let mut said = Vec::new();
+    if !same.is_empty() {
+        let same: Vec<String> = same.into_iter().map(error).collect();
+        said.push(format!("Not distinguished from it by these targets: {}.", same.join(", ")));
+    }
+    if !behind.is_empty() {
+        let mut first = true;
+        let one = |ranked: &Ranked| {
+            let Some(left @ 1..) = outside(ranked.1) else { return error(ranked) };
+            let but = if ranked.1.mean_deg < score.mean_deg { "but " } else { "" };
+            let of = if std::mem::take(&mut first) { "outside the envelope" } else { "outside" };
+            format!("{}, {but}{of} in {left} of {}", error(ranked), ranked.1.count)
+        };
+        let behind: Vec<String> = behind.into_iter().map(one).collect();
+        said.push(format!("Behind it: {}.", behind.join("; ")));
+    }
+    said
 }
 
-/// Sentence on the largest error of the best controller, with the group of the target if there are several groups. `None` if
-/// there is no group besides `all`.
-fn weakest(best: &Evaluation) -> Option<String> {
-    let groups = || best.groups.iter().filter(|s| s.targets != ALL);
-    let worst = groups().max_by(|a, b| a.max_deg.total_cmp(&b.max_deg))?;
-    let group = match groups().count() {
-        1 => String::new(),
-        _ => format!(" on {}", worst.targets.replace('_', " ")),
-    };
-    Some(format!("{} is worst{group}: {}° on one target.", label(best), number(worst.max_deg)))
-}
-
-fn percent(share: f64) -> String {
-    format!("{} %", number(100.0 * share))
+/// The share of lost targets in percent.
+fn percent(score: &Score) -> String {
+    format!("{} %", number(100.0 * score.divergence_rate))
 }

@@ -42,7 +42,7 @@ fn picture(report: &EvaluationReport) -> Section {
             let score = e.score(group)?;
             let [x, y] =
                 ["surface_travel", "error_integral_deg_s"].map(|id| score.measures.get(id));
-            Some(cross(label(e), k, x?, y?))
+            Some(cross(label(e, report.evaluations), k, x?, y?))
         });
         Figure::Xy(XyFigure {
             title: format!("Error against surface travel, {}", group.replace('_', " ")),
@@ -73,7 +73,7 @@ fn measures(report: &EvaluationReport) -> Section {
     let figure = |group: &str| {
         let scored: Vec<(&Evaluation, &Score)> =
             report.evaluations.iter().filter_map(|e| Some((e, e.score(group)?))).collect();
-        let names: Vec<String> = scored.iter().map(|(e, _)| label(e)).collect();
+        let names: Vec<String> = scored.iter().map(|(e, _)| label(e, report.evaluations)).collect();
         let mut columns = vec![("Measure", Left)];
         columns.extend(names.iter().map(|name| (name.as_str(), Right)));
         let mut table = Table::new("Measures", &columns);

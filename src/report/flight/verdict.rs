@@ -31,15 +31,20 @@ impl Parts {
         let (tracked, all) = (report.tracked(), report.segments.len());
         let mut first = vec![match all {
             0 => format!("Flew {:.1} s without a target", duration_s(&report.flight.samples)),
+            _ if tracked == all && !left(report) => {
+                format!("Flew as commanded: {tracked} of {all} targets")
+            }
             _ => format!("Tracked {tracked} of {all} targets"),
         }];
-        first.extend(settled_by_difficulty(&report.segments));
-        first.push(match report.timed().map(LoopTiming::late) {
+        first.extend(slowest(report));
+        first.extend(largest_error(&report.segments));
+        let late = match report.timed().map(LoopTiming::late) {
             None => "loop timing was not recorded".into(),
-            Some(0) => "no late cycle".into(),
-            Some(1) => "1 late cycle".into(),
-            Some(n) => format!("{n} late cycles"),
-        });
+            Some(0) => "no late cycle of the companion".into(),
+            Some(1) => "1 late cycle of the companion".into(),
+            Some(n) => format!("{n} late cycles of the companion"),
+        };
+        let settled = settled_by_difficulty(&report.segments);
         let envelope =
             report.envelope.map(|e| clause(&kept(&report.flight.samples, &e), &e.limits));
         let timed = report.timed().filter(|_| report.envelope.is_some());
@@ -53,10 +58,8 @@ impl Parts {
                 number(p999)
             )
         });
-        Parts {
-            first,
-            beside: [envelope, on_the_way(report), latency].into_iter().flatten().collect(),
-        }
+        let beside = [envelope, settled, on_the_way(report), Some(late), latency];
+        Parts { first, beside: beside.into_iter().flatten().collect() }
     }
 }
 
@@ -84,7 +87,8 @@ pub(crate) fn verdict(report: &FlightReport) -> Verdict {
     let beside = beside.iter().map(|part| capital(part) + ".");
     let details = not_tracked(report).into_iter().chain(beside).chain(details(report)).collect();
     let sentence = format!("{}.", first.join("; "));
-    Verdict { outcome, reason, sentence, details, next: report.next.clone() }
+    let (before_next, next) = (String::new(), report.next.clone());
+    Verdict { outcome, reason, sentence, details, before_next, next }
 }
 
 /// The missed requirements as text; empty if none was missed.
@@ -128,6 +132,44 @@ fn on_the_way(report: &FlightReport) -> Option<String> {
     Some(format!("integral of error up to {integral}° s{at}, overshoot up to {overshoot}°"))
 }
 
+/// Whether the flight left the envelope.
+fn left(report: &FlightReport) -> bool {
+    report.envelope.is_some_and(|e| {
+        let flown = kept(&report.flight.samples, &e);
+        flown.judged && !flown.kept
+    })
+}
+
+/// Text on the target that took longest to reach; `None` without segments or limits, or with a single segment.
+fn slowest(report: &FlightReport) -> Option<String> {
+    let qualities = report.qualities().filter(|all| all.len() > 1)?;
+    let timed = report.segments.iter().zip(&qualities).filter(|(_, q)| q.to_one_deg_s.is_finite());
+    let (segment, _) = timed.max_by(|a, b| a.1.to_one_deg_s.total_cmp(&b.1.to_one_deg_s))?;
+    Some(format!("slowest to {}", attitude(segment)))
+}
+
+/// Text on the largest settled error, with its target; `None` without a finite error.
+fn largest_error(segments: &[Segment]) -> Option<String> {
+    let known = segments.iter().filter(|s| s.settled_error_rad.is_finite());
+    let worst = known.max_by(|a, b| a.settled_error_rad.total_cmp(&b.settled_error_rad))?;
+    Some(format!(
+        "largest settled error {}, at {}",
+        degrees(worst.settled_error_rad),
+        attitude(worst)
+    ))
+}
+
+/// The target of a segment, in whole degrees.
+fn attitude(segment: &Segment) -> String {
+    let whole = |rad: f64| match rad.to_degrees().round() {
+        0.0 => "0".into(),
+        deg => format!("{deg:+.0}").replace('-', "−"),
+    };
+    let [roll, pitch] = [segment.roll_target_rad, segment.pitch_target_rad].map(whole);
+    format!("roll {roll}°, pitch {pitch}°")
+}
+
+/// Text on the mean settled error of each group of targets; `None` without a finite error.
 fn settled_by_difficulty(segments: &[Segment]) -> Option<String> {
     let group = |difficulty: Difficulty| {
         let of = segments.iter().filter(|s| s.difficulty == difficulty);
@@ -137,7 +179,7 @@ fn settled_by_difficulty(segments: &[Segment]) -> Option<String> {
     };
     let groups: Vec<String> =
         [Difficulty::Easy, Difficulty::Hard].into_iter().filter_map(group).collect();
-    (!groups.is_empty()).then(|| format!("settled error {}", groups.join(", ")))
+    (!groups.is_empty()).then(|| format!("mean settled error {}", groups.join(", ")))
 }
 
 fn details(report: &FlightReport) -> Vec<String> {

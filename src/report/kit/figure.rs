@@ -71,6 +71,8 @@ pub struct Verdict {
     pub sentence: String,
     /// Further lines below the sentence, in order.
     pub details: Vec<String>,
+    /// What to do before the next command, such as "fly it, then"; empty if there is nothing.
+    pub before_next: String,
     /// The next command for the user to run; empty if there is none.
     pub next: String,
 }
@@ -94,16 +96,26 @@ impl Verdict {
         format!(
             "<div class=\"verdict {class}\"><span class=\"outcome\">{word}{reason}</span><p>{}</p>{}{list}</div>\n",
             escape(&self.sentence),
-            next_command(&self.next)
+            next_command_after(&self.before_next, &self.next)
         )
     }
 }
 
 /// The next command as a line of a box; empty if there is no command.
 pub(crate) fn next_command(next: &str) -> String {
+    next_command_after("", next)
+}
+
+/// The next command as a line of a box, with what to do before it.
+fn next_command_after(before: &str, next: &str) -> String {
+    let space = if before.is_empty() { "" } else { " " };
     match next.is_empty() {
         true => String::new(),
-        false => format!("<p class=\"rest\">Next: <code>{}</code></p>", escape(next)),
+        false => format!(
+            "<p class=\"rest\">Next: {}{space}<code>{}</code></p>",
+            escape(before),
+            escape(next)
+        ),
     }
 }
 
@@ -152,4 +164,17 @@ pub struct Rule {
     pub value: f64,
     /// Name of the line, one or two words.
     pub label: String,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_to_do_first_stands_before_the_next_command() {
+        let said = |before: &str| next_command_after(before, "greylag amend");
+        assert_eq!(said(""), next_command("greylag amend"));
+        assert!(said("fly it, then").contains("Next: fly it, then <code>greylag amend</code>"));
+        assert_eq!(next_command_after("fly it, then", ""), "");
+    }
 }

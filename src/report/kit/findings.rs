@@ -37,7 +37,7 @@ impl Findings {
         let lead: String = self.lead.iter().map(|f| format!("<p>{}</p>", f.html())).collect();
         let rest: String = self.rest.iter().map(|f| format!("<li>{}</li>", f.html())).collect();
         let list = if rest.is_empty() { rest } else { format!("<ul>{rest}</ul>") };
-        format!("<div class=\"verdict findings\">{lead}{}{list}</div>\n", next_command(&self.next))
+        format!("<div class=\"verdict findings\">{lead}{list}{}</div>\n", next_command(&self.next))
     }
 }
 

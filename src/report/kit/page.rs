@@ -9,8 +9,9 @@ const UPLOT_SCRIPT: &str = include_str!("assets/uPlot.iife.min.js");
 const UPLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
 const UPLOT_LICENCE: &str = include_str!("assets/uPlot.LICENSE");
 const STYLE: &str = include_str!("assets/page.css");
-/// Scripts that draw the figures. Each uses functions of the scripts before it, so they are joined into one.
-const SCRIPTS: [&str; 4] = [
+/// Scripts that set the line breaks and draw the figures. Each uses functions of the scripts before it, so all run in one scope.
+const SCRIPTS: [&str; 5] = [
+    include_str!("assets/words.js"),
     include_str!("assets/draw.js"),
     include_str!("assets/link.js"),
     include_str!("assets/bins.js"),

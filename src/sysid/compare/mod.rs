@@ -17,6 +17,7 @@ mod flight;
 pub mod forecast;
 pub mod free_run;
 mod known;
+mod order;
 mod power;
 mod result;
 mod run;

@@ -239,13 +239,13 @@ fn plus_minus(value: f64, half: f64) -> String {
     format!("{value:.places$} ± {half:.places$}")
 }
 
-/// `x` with `figures` significant figures, without trailing zeros after the decimal point.
+/// `x` with `figures` significant figures, without trailing zeros after the decimal point, and with the minus sign U+2212.
 fn significant(x: f64, figures: i32) -> String {
     if x == 0.0 || !x.is_finite() {
         return "0".into();
     }
     let places = (figures - 1 - x.abs().log10().floor() as i32).max(0) as usize;
-    let text = format!("{x:.places$}");
+    let text = format!("{x:.places$}").replace('-', "−");
     match text.contains('.') {
         true => text.trim_end_matches('0').trim_end_matches('.').into(),
         false => text,
@@ -341,7 +341,7 @@ mod tests {
         );
         let at = regime(RegimeVariable::Q, f64::NAN, -30.0, 0.04, 0.0);
         let said = say(ChannelId::Pitch, at, Trend::None);
-        assert!(said.contains("is 0.04 N m too far nose down for pitch rate < -30 °/s"), "{said}");
+        assert!(said.contains("is 0.04 N m too far nose down for pitch rate < −30 °/s"), "{said}");
     }
 
     #[test]

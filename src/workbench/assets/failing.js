@@ -97,8 +97,8 @@ function switcher() {
   const press = (to) => { pick.base = to; pick.by_hand = false; switcher(); pressed_cell(); };
   const why = { tuned: "its own coefficients fitted: what is left is for a missing effect to explain", given: ways.includes("tuned") ? "what tuning takes away was wrong coefficients, no missing effect" : "as its file has it; Diagnose tunes it first" };
   const button = (to) => el("button", { type: "button", "data-base": to, "aria-pressed": to === now ? "true" : "false", disabled: !ways.includes(to), onclick: () => press(to) }, WORD[to]);
-  const error = error_over(RUN_S, bench.failing.models[ways.indexOf(now)]);
-  const off = error == null ? [] : [el("b", { class: "off", title: "root mean square over the eight states of free runs, each state over its characteristic value (NRMSE)" }, `error over ${RUN_S} s: ${show(error, 3)}`)];
+  const errors = ["given", "tuned"].map((to) => [error_over(RUN_S, bench.failing.models[ways.indexOf(to)]), WORD[to]]).filter(([error]) => error != null);
+  const off = errors.length ? [el("b", { class: "off", title: "root mean square over the eight states of free runs, each state over its characteristic value (NRMSE)" }, `error over ${RUN_S} s: ${errors.map(([error, word]) => `${show(error, 3)} ${word}`).join(" → ")}`)] : [];
   parts.base.replaceChildren(el("b", {}, "Model"), button("tuned"), button("given"), ...off, el("span", { class: "muted" }, why[now]));
   if (inside) parts.base.querySelector("[aria-pressed=true]").focus();
 }

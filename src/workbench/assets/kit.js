@@ -1,5 +1,12 @@
 // Functions of all panes: elements, requests, numbers and plots.
 
+const HARD = "\u00a0";
+/** A number, a space, and a unit after which no letter or digit follows. */
+const UNIT = /(\d|°) (?=(?:%|°\/s²?|°|m\/s²?|N m|[µm]?s|k?m|N|Hz|kg|dB)(?![\w°/²³]))/g;
+/** The text without line breaks between numbers and their units. */
+const unbroken = (text) => text.replace(UNIT, `$1${HARD}`).replace(/± (?=\d)/g, `±${HARD}`).replace(/N m\b/g, `N${HARD}m`);
+const LITERAL = new Set(["code", "textarea", "option", "button"]);
+
 /** Makes an element with properties and children. A child that is false or null is left out. */
 export function el(tag, properties = {}, ...children) {
   const node = document.createElement(tag);
@@ -10,7 +17,8 @@ export function el(tag, properties = {}, ...children) {
     else if (key === "vars") for (const [name, v] of Object.entries(value)) node.style.setProperty(name, v);
     else node.setAttribute(key, value === true ? "" : value);
   }
-  node.append(...children.flat().filter((c) => c != null && c !== false));
+  const shown = children.flat().filter((c) => c != null && c !== false);
+  node.append(...shown.map((c) => (typeof c === "string" && !LITERAL.has(tag) ? unbroken(c) : c)));
   return node;
 }
 
@@ -41,12 +49,20 @@ export function show(v, digits = 3) {
   const text = a < 1e-4 || a >= 1e6 ? v.toExponential(digits - 1) : v.toFixed(Math.max(0, Math.min(6, digits - 1 - Math.floor(Math.log10(a)))));
   return text.replace("-", "−");
 }
-export const percent = (v) => (v == null || !isFinite(v) ? "–" : `${(100 * v).toFixed(Math.abs(v) < 0.0995 ? 1 : 0).replace("-", "−")} %`);
+export const percent = (v) => (v == null || !isFinite(v) ? "–" : `${(100 * v).toFixed(Math.abs(v) < 0.0995 ? 1 : 0).replace("-", "−")}${HARD}%`);
 
 export const SYMBOL = {
   alpha: "α", beta: "β", airspeed: "V", throttle: "δt", p: "p", q: "q", r: "r", aileron: "δa", elevator: "δe",
   aileron_rate: "δ̇a", elevator_rate: "δ̇e", altitude: "h", time: "t", flight: "flight",
 };
+const CHANNEL = { D: "drag", L: "lift", Y: "side force", l: "rolling", m: "pitching", n: "yawing" };
+/** The names of channels as a list in a sentence, such as "lift, pitching and rolling moment". */
+export function channel_words(channels) {
+  const moment = (c) => "lmn".includes(c);
+  const all = [...channels.filter((c) => !moment(c)), ...channels.filter(moment)].map((c) => CHANNEL[c] ?? c);
+  const listed = all.length > 1 ? `${all.slice(0, -1).join(", ")} and ${all[all.length - 1]}` : all.join("");
+  return channels.some(moment) ? `${listed} moment` : listed;
+}
 /** The score at the longest horizon that runs reach, up to 5 s. */
 const reached = (scores) => (scores ?? []).filter((s) => s.runs > 0 && s.horizon_s <= 5.001 && s.rmse_scaled != null).pop();
 /** The error (NRMSE) at this horizon. */
@@ -59,11 +75,13 @@ export const verdicts = (state) => [...state.stack].reverse().find((s) => s.stor
 /** The equivalent command, with a button that copies it. */
 export function command(text, what = "The same") {
   if (!text) return null;
+  // the command breaks only at its spaces
+  const words = text.split(" ").flatMap((word, k) => [k ? " " : null, el("span", { class: "word" }, word)]);
   const copy = el("button", { type: "button", onclick: async () => {
     await navigator.clipboard?.writeText(text);
     copy.textContent = "Copied";
   } }, "Copy");
-  return el("details", { class: "command" }, el("summary", {}, `${what} on the command line`), el("code", {}, text), copy);
+  return el("details", { class: "command" }, el("summary", {}, `${what} on the command line`), el("code", {}, words), copy);
 }
 
 // ---- plots ----

@@ -20,8 +20,13 @@ export function model(bench) {
     el("button", { type: "button", id: "judge", disabled: !tests.length || !stack.length || unfitted || state.jobs.length > 0, title: stack.length ? "Opens the test flights; each opening is counted and recorded" : "Accept an effect first: each opening of the test flights is counted and recorded", onclick: () => bench.act({ do: "judge" }) }, "Judge"),
     el("button", { type: "button", id: "save", class: stack.length && !unfitted ? "main" : "", disabled: !stack.length || unfitted || state.jobs.length > 0, onclick: () => save(bench) }, "Save"),
     el("button", { type: "button", id: "fly-it", onclick: () => bench.show("fly") }, "Fly it"));
-  body.replaceChildren(...[outside, base, box(state), errors(state), ...stack.map((s) => step(bench, s)), !stack.length && el("p", { class: "empty" }, "No effect is accepted yet: tick a suspect to see by how much the error falls."),
+  body.replaceChildren(...[outside, base, box(state), errors(state), ...stack.map((s) => step(bench, s)), !stack.length && el("p", { class: "empty" }, nothing(bench.diagnosis)),
     buttons, saved.note, opened(state), command(state.commands.amend, "Model and Save"), command(state.commands.judge, "Judge")].filter(Boolean));
+}
+
+/** Text in place of the accepted effects. */
+function nothing(diagnosis) {
+  return diagnosis && !diagnosis.effects.some((e) => e.asserted) ? "No suspect is strong enough to accept." : "No effect is accepted yet: tick a suspect to see by how much the error falls.";
 }
 
 /** The answer in the words of the command `amend`. */

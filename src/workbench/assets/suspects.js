@@ -1,6 +1,6 @@
 // The pane of suspects: candidate effects in the order of their evidence. A tick accepts an effect.
 
-import { command, draw, el, ink, line, percent, show } from "./kit.js";
+import { channel_words, command, draw, el, ink, line, percent, show } from "./kit.js";
 
 const open = new Set();
 let before = "";
@@ -29,7 +29,7 @@ export function suspects(bench) {
   const passing = diagnosis.effects.filter((e) => e.asserted || e.evidence > e.threshold || ticked(bench, e.id));
   const others = diagnosis.effects.filter((e) => !passing.includes(e));
   const most = Math.max(...diagnosis.effects.map((e) => e.evidence), 1);
-  body.replaceChildren(verdict(diagnosis), ...passing.map((e) => suspect(bench, e, most)),
+  body.replaceChildren(verdict(bench, diagnosis), ...passing.map((e) => suspect(bench, e, most)),
     more(`${others.length} others stay under what chance reaches`, others.map((e) => suspect(bench, e, most))),
     notes(bench, diagnosis), behind || "", el("div", { class: "row" }, ask), ...end);
   pane.scrollTop = kept;
@@ -43,9 +43,19 @@ function first(job) {
   return el("div", {}, el("p", { class: "note" }, "First ranking; the checks are running:"), el("ol", { class: "first" }, best.map((c) =>
     el("li", {}, `${c.id}: evidence ${show(c.evidence)}, chance reaches ${show(c.threshold)}`))));
 }
-function verdict(diagnosis) {
+function verdict(bench, diagnosis) {
   const [lead, ...rest] = diagnosis.sentences;
-  return el("div", { class: `verdict ${diagnosis.verdict}` }, el("p", {}, lead ?? diagnosis.verdict), rest.length ? more("More", rest.map((s) => el("p", {}, s)), "sentences") : null);
+  const then = next(bench, diagnosis);
+  return el("div", { class: `verdict ${diagnosis.verdict}` }, el("p", {}, lead ?? diagnosis.verdict), then && el("p", { class: "next" }, then), rest.length ? more("More", rest.map((s) => el("p", {}, s)), "sentences") : null);
+}
+/** Where the first asserted effect that is not accepted acts, and the next step; null if there is no such step. */
+function next(bench, diagnosis) {
+  const found = diagnosis.effects.find((e) => e.asserted && !ticked(bench, e.id));
+  const where = found?.channels.length ? `Acts in ${channel_words(found.channels)}. ` : "";
+  if (found) return `${where}Next: tick ${found.id}.`;
+  const fitted = bench.state.flights.filter((f) => f.role === "fit" && !f.error);
+  const alone = diagnosis.verdict === "unknown" && fitted.length === 1;
+  return alone ? "Next: drop more flights into the pane Flights, then Diagnose again." : null;
 }
 function more(summary, children, id = summary) {
   if (!children.length) return "";
@@ -66,7 +76,7 @@ function suspect(bench, e, most) {
   const facts = [decisive(e)];
   if (e.heldout_error_reduction != null) facts.push(`takes ${percent(e.heldout_error_reduction)} of the error on held-out segments`);
   if (e.selected_in_bootstraps != null) facts.push(`best in ${percent(e.selected_in_bootstraps)} of bootstraps`);
-  if (e.channels.length) facts.push(`acts in ${e.channels.join(", ")}`);
+  if (e.channels.length) facts.push(`acts in ${channel_words(e.channels)}`);
   return el("article", { class: `suspect ${e.asserted ? "asserted" : ""}` },
     el("label", {}, box, el("span", {}, e.id, " ", tag)),
     el("p", { class: "muted" }, e.description),

@@ -164,13 +164,18 @@ function heatChart(host, data) {
     ctx.lineWidth = 2 * px();
     ctx.strokeRect(x + px(), y + px(), w - 3 * px(), h - 3 * px());
   }));
+  // a label is a name with its unit in brackets, such as "Sideslip β (°)"
+  const along = (label, from, to) => {
+    const [, name, unit] = label.match(/^(.*?)(?: \(([^)]*)\))?$/);
+    return `${name} ${span(from, to, unit)}`;
+  };
   const tell = (n) => {
     if (n === told) return;
     told = n;
     u.redraw(false);
     const c = cells[n];
     note.textContent = !c ? "" :
-      `α ${span(xe[c.x], xe[c.x + 1], "°")}, β ${span(ye[c.y], ye[c.y + 1], "°")}: ${show(c.value)} ${data.unit}, ${counted(c.samples)}`;
+      `${along(data.x_label, xe[c.x], xe[c.x + 1])}, ${along(data.y_label, ye[c.y], ye[c.y + 1])}: ${show(c.value)} ${data.unit}, ${counted(c.samples)}`;
   };
   const ends = (edges) => [edges[0] ?? 0, edges[edges.length - 1] ?? 1];
   const u = new uPlot({

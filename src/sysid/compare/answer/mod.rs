@@ -25,7 +25,7 @@ pub struct Answer {
     /// Sentences on the added effects with their most significant coefficients, and on the state whose prediction improves
     /// most; empty if there is neither.
     pub effect: String,
-    /// Sentence on the largest remaining prediction error.
+    /// Sentence on the largest remaining prediction error, relative to the usual range of its state.
     pub left: String,
     /// The recommended next command; empty if there is none.
     #[serde(skip_serializing_if = "String::is_empty")]
@@ -203,7 +203,10 @@ mod tests {
             "drag_beta2 (drag rises with the square of sideslip): CDbeta2 = 0.991 (95 %: 0.986 to 0.997). With it the \
              airspeed predicted 5 s ahead is off by 0.02 m/s instead of 0.5 m/s by tuning alone."
         );
-        assert_eq!(answer.left, "Largest error left: sideslip, 0.115° after 5 s.");
+        assert_eq!(
+            answer.left,
+            "Largest error against its usual range: sideslip, 0.115° after 5 s."
+        );
         assert_eq!(answer.summary(), "error at 5 s 0.0873 → 0.00083 (−99.0 %)");
         let json = serde_json::to_value(&answer).unwrap();
         assert_eq!(json["numbers"]["steps"][2]["error"], 0.00083);
@@ -225,9 +228,40 @@ mod tests {
         let one = Answer::of(&subject(&scores[..1], Vec::new()));
         assert_eq!(one.error, "On 2 flights not fitted the error at 5 s is 0.02.");
         assert!(one.effect.is_empty() && one.summary() == "error at 5 s 0.02");
-        assert_eq!(one.left, "Largest error: airspeed, 0.5 m/s after 5 s.");
-        let tuned = Answer::of(&subject(&scores[..2], Vec::new())).error;
-        assert!(tuned.ends_with("by tuning (+100 %): tuning does not help."), "{tuned}");
+        assert_eq!(one.left, "Largest error against its usual range: airspeed, 0.5 m/s after 5 s.");
+    }
+
+    #[test]
+    fn a_model_that_tuning_makes_worse_is_kept() {
+        let scores = [(Way::Given, score(0.02, 0.5, 0.01)), (Way::Tuned, score(0.04, 0.4, 0.06))];
+        let tuned = Answer::of(&subject(&scores, Vec::new()));
+        assert_eq!(
+            tuned.error,
+            "Keep the model as it is: on 2 flights not fitted its error at 5 s is 0.02; tuned it is 0.04."
+        );
+        // the largest error is that of the model as given, and no gain of the tuned model is praised
+        assert_eq!(
+            tuned.left,
+            "Largest error of the model as given, against its usual range: airspeed, 0.5 m/s after 5 s."
+        );
+        assert_eq!(tuned.effect, "");
+        let fitted = Answer::of(&Subject { seen: Seen::Of(2), ..subject(&scores, Vec::new()) });
+        assert_eq!(
+            fitted.error,
+            "Keep the model as it is: its error at 5 s is 0.02; tuning it to these flights makes it 0.04."
+        );
+    }
+
+    #[test]
+    fn flights_of_the_fit_are_called_so() {
+        let scores = [(Way::Given, score(0.02, 0.5, 0.01))];
+        let of = |flights: &[&str]| {
+            let flights: Vec<String> = flights.iter().map(|f| (*f).to_owned()).collect();
+            let seen = Seen::Of(flights.len());
+            Answer::of(&Subject { flights, seen, ..subject(&scores, Vec::new()) }).error
+        };
+        assert!(of(&["a", "b"]).starts_with("On the 2 flights that it was fitted to, the error"));
+        assert!(of(&["a"]).starts_with("On the flight that it was fitted to, the error"));
     }
 
     #[test]

@@ -8,6 +8,9 @@ use serde::Serialize;
 use super::{ANSWER_S, Seen, Stage, Subject};
 use crate::compare::result::{HorizonScore, StateScore};
 
+/// Magnitude of a change of the error, %, below which the error is said to stay.
+pub(super) const NOTICED: f64 = 0.05;
+
 /// Derivation of a model from the model before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -79,7 +82,7 @@ pub struct InUse {
     pub after: f64,
 }
 
-/// The state with the largest error of the last model relative to its scale x_c.
+/// The state with the largest remaining error relative to its scale x_c.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Left {
     /// State with its unit, as in `State::NAMES`.
@@ -120,7 +123,8 @@ pub struct Numbers {
     /// The state whose prediction improves most; `None` if no prediction improves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub in_use: Option<InUse>,
-    /// The state with the largest remaining error; `None` if no horizon is reached.
+    /// The state with the largest remaining error, under the first model if tuning it is in vain. `None` if no horizon is
+    /// reached.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left: Option<Left>,
 }
@@ -132,6 +136,7 @@ impl Numbers {
         let at: Vec<&HorizonScore> =
             stages.iter().filter_map(|s| score(s.scores, horizon_s)).collect();
         let steps = steps(stages, &at);
+        let kept = if in_vain(&steps) { at.first() } else { at.last() };
         let change_percent = match &steps[..] {
             [first, .., last] => change(first.error, last.error),
             _ => f64::NAN,
@@ -157,10 +162,20 @@ impl Numbers {
             baseline,
             effects: subject.effects.clone(),
             in_use: before.zip(at.last()).and_then(|(before, after)| in_use(before, after)),
-            left: at.last().and_then(|last| left(last)),
+            left: kept.and_then(|kept| left(kept)),
             steps,
         }
     }
+
+    /// Whether the only change of the model was to tune it, and its error rises.
+    pub(super) fn in_vain(&self) -> bool {
+        in_vain(&self.steps)
+    }
+}
+
+fn in_vain(steps: &[Step]) -> bool {
+    let rises = |tuned: &Step| tuned.change_percent.is_some_and(|p| p >= NOTICED);
+    matches!(steps, [_, tuned] if tuned.way == Way::Tuned && rises(tuned))
 }
 
 /// The longest horizon up to [`ANSWER_S`], s, that runs of every model reach. If there is none, the shortest horizon that runs

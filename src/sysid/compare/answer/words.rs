@@ -1,13 +1,16 @@
 //! Sentences and phrases of the answer to a comparison or refit, composed from its numbers. The error is that of free runs
 //! (open-loop simulations) at a horizon.
 
-use super::numbers::{Decisive, InUse, Left, Numbers, Step, Way};
+use super::numbers::{Decisive, InUse, Left, NOTICED, Numbers, Step, Way};
 
 /// Sentence on the error of the models and its change from one model to the next.
 pub fn error(n: &Numbers) -> String {
     let Some((first, rest)) = n.steps.split_first() else {
         return "No free run is long enough for an error to be given.".into();
     };
+    if n.in_vain() {
+        return kept(n, first.error, rest[0].error);
+    }
     let mut text = format!("{} the error at {} s", on(n), number(n.horizon_s));
     if rest.is_empty() {
         text += &beside_baseline(n, first.error);
@@ -48,14 +51,25 @@ pub fn error(n: &Numbers) -> String {
         text += &(joint + &change);
         last = Some(verb);
     }
-    let in_vain = matches!(rest, [only] if only.way == Way::Tuned && verb(only) == Verb::Rises);
-    if in_vain {
-        text += ": tuning does not help";
-    }
     text + "."
 }
 
-/// Part of a sentence with the error of a single model, compared with that of the best forecast without aerodynamics.
+/// Sentence on a model whose error rises from `given` to `tuned` by tuning.
+fn kept(n: &Numbers, given: f64, tuned: f64) -> String {
+    let fitted = n.fitted_flights.is_some_and(|fitted| fitted >= n.flights.len());
+    let (at, given, tuned) = (number(n.horizon_s), number(given), number(tuned));
+    match fitted {
+        true => format!(
+            "Keep the model as it is: its error at {at} s is {given}; tuning it to these flights makes it {tuned}."
+        ),
+        false => format!(
+            "Keep the model as it is: {} its error at {at} s is {given}; tuned it is {tuned}.",
+            lower(&on(n))
+        ),
+    }
+}
+
+/// The error of a single model, compared with the error of the best forecast without aerodynamics.
 fn beside_baseline(n: &Numbers, error: f64) -> String {
     let text = format!(" is {}", number(error));
     let Some(b) = &n.baseline else { return text };
@@ -82,7 +96,8 @@ pub fn effect(n: &Numbers) -> String {
         (_, 1) => "With it".into(),
         _ => "With them".into(),
     };
-    said.extend(n.in_use.as_ref().map(|used| in_use(n, used, &subject)));
+    let used = n.in_use.as_ref().filter(|_| !n.in_vain());
+    said.extend(used.map(|used| in_use(n, used, &subject)));
     said.join(" ")
 }
 
@@ -128,13 +143,13 @@ fn in_use(n: &Numbers, used: &InUse, subject: &str) -> String {
     )
 }
 
-/// Sentence on the largest remaining error; empty if there is no error. For a single model, the word "left" is omitted.
+/// Sentence on the state with the largest remaining error relative to its scale; empty if there is no error.
 pub fn left(n: &Numbers) -> String {
     n.left.as_ref().map_or(String::new(), |Left { state, rmse }| {
         let (name, unit, factor) = people(state);
-        let remains = if n.steps.len() > 1 { " left" } else { "" };
+        let of = if n.in_vain() { " of the model as given," } else { "" };
         format!(
-            "Largest error{remains}: {name}, {}{unit} after {} s.",
+            "Largest error{of} against its usual range: {name}, {}{unit} after {} s.",
             number(factor * rmse),
             number(n.horizon_s)
         )
@@ -166,7 +181,8 @@ fn on(n: &Numbers) -> String {
         _ if n.last_third => format!("On the last third of {}, not fitted,", n.flights.join(", ")),
         None => format!("On {flights}"),
         Some(0) => format!("On {flights} not fitted"),
-        Some(fitted) if fitted >= all => format!("On {flights}, fitted,"),
+        Some(fitted) if fitted >= all && all == 1 => "On the flight that it was fitted to,".into(),
+        Some(fitted) if fitted >= all => format!("On the {flights} that it was fitted to,"),
         Some(fitted) => format!("On {flights}, {fitted} of them fitted,"),
     }
 }
@@ -199,8 +215,8 @@ impl Verb {
 
 fn verb(step: &Step) -> Verb {
     match step.change_percent {
-        Some(p) if p <= -0.05 => Verb::Falls,
-        Some(p) if p >= 0.05 => Verb::Rises,
+        Some(p) if p <= -NOTICED => Verb::Falls,
+        Some(p) if p >= NOTICED => Verb::Rises,
         _ => Verb::Stays,
     }
 }

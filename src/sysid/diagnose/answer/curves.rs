@@ -60,6 +60,9 @@ pub fn over_the_best(
     regimes: &[[f64; RegimeVariable::CONTINUOUS.len()]],
     relative: f64,
 ) -> Option<Curve> {
+    if made.is_empty() {
+        return None;
+    }
     let shown = |k: &usize| !NOT_SHOWN.contains(&RegimeVariable::CONTINUOUS[*k]);
     let best = (0..RegimeVariable::CONTINUOUS.len())
         .filter(shown)
@@ -121,6 +124,11 @@ fn explained(y: &[f64], x: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn without_a_window_there_is_no_curve() {
+        assert!(over_the_best(ChannelId::Lift, Vec::new(), Vec::new(), &[], 0.1).is_none());
+    }
 
     #[test]
     fn a_curve_reaches_as_far_as_the_data() {

@@ -13,3 +13,4 @@ pub(super) mod rival;
 pub(super) mod run;
 pub(super) mod sentences;
 pub(super) mod shares;
+pub(super) mod verdict;

@@ -5,7 +5,7 @@
 use crate::diagnose::answer::result::{
     Candidate, ChannelLeft, FlightTrim, Measurement, Parameter, Status, Verdict,
 };
-use crate::diagnose::answer::{per_flight, shares};
+use crate::diagnose::answer::{per_flight, shares, verdict};
 use crate::diagnose::options::Options;
 use crate::diagnose::search::stepwise::Found;
 use crate::per_flight::askew;
@@ -15,13 +15,10 @@ use greylag_physics::catalogue::describe;
 /// A re-estimated coefficient gets a note if it differs from its value in the model file by more than this number of prior
 /// standard deviations.
 const FAR: f64 = 3.0;
-/// Smallest removable share of the residual that is reported. A smaller share would be printed as zero.
-const SHOWN: f64 = 0.005;
+/// Smallest share that is reported. A smaller share would be printed as zero.
+pub const SHOWN: f64 = 0.005;
 /// Half width of a 95 % interval in standard deviations.
 pub const INTERVAL: f64 = 1.96;
-/// An effect that is not asserted is named as the closest one if it removes more than this share of the residual in blocks
-/// of data that its fit did not use.
-const CLOSEST: f64 = 0.5;
 /// Advice for misaligned axes.
 const AXES: &str = "amend with --axes-askew 3, or mount the board anew";
 
@@ -66,7 +63,7 @@ pub fn sentences(content: &Content) -> Vec<String> {
         all.extend(askew.into_iter().map(|s| format!("{s} To keep it out of the model, {AXES}.")));
     }
     all.extend(effects.iter().filter(|c| c.asserted).map(asserted));
-    all.extend(answer(content));
+    all.extend(verdict::sentence(content));
     all.extend(effects.iter().filter(|c| c.status == Status::Small).map(small));
     if verdict != Verdict::Unknown {
         all.extend(beyond(content));
@@ -94,66 +91,7 @@ pub fn sentences(content: &Content) -> Vec<String> {
     all
 }
 
-/// Sentence that states the verdict. `None` if effects are asserted, because each of them has its own sentence.
-fn answer(content: &Content) -> Option<String> {
-    let Content { found, verdict, doubtful, effects, .. } = *content;
-    match verdict {
-        Verdict::Effect => None,
-        Verdict::Adequate => Some(format!(
-            "Nothing is missing that these flights could show: the tuned model explains them as well as \
-             chance allows{}.",
-            best_of(effects)
-        )),
-        Verdict::Unexplained => Some(unexplained(found, effects)),
-        Verdict::Unknown if doubtful.is_empty() => Some(undecided(content)),
-        Verdict::Unknown => Some(
-            "So nothing is said about forces and moments: put that right first, or leave this flight out.".into(),
-        ),
-    }
-}
-
-/// Sentence for [`Verdict::Unknown`]: why no effect is asserted although the residual exceeds noise.
-fn undecided(content: &Content) -> String {
-    match content.why_unknown {
-        Some(WhyUnknown::GivenModelFaultless) => "The model as given has no sure error in any channel of these flights, \
-             so nothing is said to be missing. What the tuned model leaves beyond noise comes from the record: filtered, \
-             slow or late sensors; log faster and unfiltered to see more."
-            .into(),
-        Some(WhyUnknown::NotOfTheStates) => format!(
-            "These flights cannot say whether the model lacks anything: the tuned model leaves more than noise{}, so most \
-             of it is not a function of the states. Filtered, slow or late sensors are likelier than a missing force or \
-             moment; log faster and unfiltered.",
-            removable(content.found)
-        ),
-        _ => "These flights cannot say whether the model lacks anything: in every channel the uncertainty of the \
-             sensor errors may explain the whole residual; log what is noted below, or fly with better sensors."
-            .into(),
-    }
-}
-
-/// Sentence that states that something is missing that is not in the catalogue. It names the closest effect of the catalogue
-/// if that effect removes most of the residual.
-fn unexplained(found: &Found, effects: &[Candidate]) -> String {
-    let close = |c: &&Candidate| c.status == Status::Refused && c.heldout_error_reduction > CLOSEST;
-    match effects.iter().find(close) {
-        Some(c) => format!(
-            "Something is missing. The closest effect of the catalogue is {} ({}): {}; it takes {:.0} % of the error on \
-             segments that it was not fitted on, and it is not all of it{}.",
-            c.description.trim_end_matches('.'),
-            c.id,
-            values(c),
-            100.0 * c.heldout_error_reduction,
-            removable(found)
-        ),
-        None => format!(
-            "Something is missing, and no effect of the catalogue is it{}{}.",
-            removable(found),
-            best_of(effects)
-        ),
-    }
-}
-
-/// Sentences on the residual that remains after the asserted effects are added.
+/// Sentences on the residual that remains with the effects found.
 fn beyond(content: &Content) -> Vec<String> {
     let Content { found, verdict, channels, .. } = *content;
     let left = channels.iter().filter(|c| !c.abstained).filter_map(|c| {
@@ -212,8 +150,8 @@ pub fn with_interval(value: f64, sd: f64, unit: &str) -> String {
     format!("{} ± {} {unit}", figures(value), figures(INTERVAL * sd)).trim_end().to_owned()
 }
 
-/// The coefficients of an effect with their 95 % intervals, as text.
-fn values(c: &Candidate) -> String {
+/// The parameters with their 95 % intervals, in words.
+pub fn values(c: &Candidate) -> String {
     let of = |p: &Parameter| {
         let sd = (p.ci95[1] - p.ci95[0]) / (2.0 * INTERVAL);
         let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
@@ -272,28 +210,6 @@ fn alike(others: &[String], separate: &str) -> String {
         " It could also be {}: these data cannot tell them apart{decides}.",
         others.join(" or ")
     )
-}
-
-/// Phrase that states how much of the residual a flexible model could remove. It is empty if this does not exceed chance.
-fn removable(found: &Found) -> String {
-    let more = found.remainder.total > found.remainder.total_threshold;
-    match more && found.learnable() >= SHOWN {
-        true => format!(
-            ": a flexible model could remove {:.0} % of the error beyond noise on flights that it was not \
-             fitted on",
-            100.0 * found.learnable()
-        ),
-        false => String::new(),
-    }
-}
-
-fn best_of(effects: &[Candidate]) -> String {
-    effects.iter().find(|c| !c.asserted).map_or(String::new(), |c| {
-        format!(
-            " (the closest is {}, evidence {:.1}, where chance reaches {:.1})",
-            c.id, c.evidence, c.threshold
-        )
-    })
 }
 
 /// `x` to three significant figures.

@@ -79,7 +79,7 @@ fn worst_of(mut points: Vec<Point>, channel: usize) -> Option<String> {
                     bin[bin.len() - 1].0[k],
                     variable.unit()
                 );
-                best = Some((z, words.trim().to_owned()));
+                best = Some((z, words.trim().replace('-', "−")));
             }
         }
     }

@@ -209,9 +209,11 @@ fn settled(found: &Found, verdict: Verdict) -> Option<String> {
         ),
         Verdict::Effect => {
             let ids = found.selected.iter().filter(|s| s.refused.is_empty()).map(|s| s.id);
+            let ids: Vec<&str> = ids.collect();
             Some(format!(
-                "The catalogue explains it ({}), so no formula is proposed; `greylag amend --accept` adds it.",
-                ids.collect::<Vec<_>>().join(", ")
+                "The catalogue explains it ({}), so no formula is proposed; `greylag amend --effect {}` adds it.",
+                ids.join(", "),
+                ids.join(" ")
             ))
         }
     }
