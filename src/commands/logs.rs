@@ -205,7 +205,7 @@ fn csv_file(flight: &Flight, output: &Path, force: bool) -> Result<()> {
 
 /// Number of decimals for the standard deviation `sd`: enough for one or two significant digits, at least 5, at most 9.
 fn decimals(sd: f64) -> usize {
-    if sd > 0.0 { (1.0 - sd.log10()).clamp(5.0, 9.0) as usize } else { 5 }
+    if sd > 0.0 { (1.0 - sd.log10()).ceil().clamp(5.0, 9.0) as usize } else { 5 }
 }
 
 fn print_reconstruction(flight: &Reconstruction, output: &Path) {

@@ -141,12 +141,15 @@ impl Rows {
 
     /// Counts row `number` and returns it if its time is later than `last` (s), even if required columns are empty.
     pub fn later(&mut self, number: usize, sample: Sample, last: Option<f64>) -> Option<Sample> {
-        let later = last.is_none_or(|last| sample.time_s > last);
-        if later && sample.time_s.is_finite() {
-            self.total += 1;
-            return Some(sample);
+        if !sample.time_s.is_finite() {
+            return self.judged(number, None, last);
         }
-        self.judged(number, None, last)
+        self.total += 1;
+        if last.is_some_and(|last| sample.time_s <= last) {
+            self.drop(number, Reason::OutOfOrder);
+            return None;
+        }
+        Some(sample)
     }
 
     /// Whether too many rows were dropped for this tolerance: the number of the first dropped row, or `None` if the log is

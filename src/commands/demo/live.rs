@@ -24,6 +24,12 @@ pub struct Live<'a> {
     drawn: usize,
 }
 
+/// Prints `rows`. A closed standard output must not end the flight, so errors are ignored.
+fn show(rows: &[impl std::fmt::Display]) {
+    let mut out = std::io::stdout().lock();
+    let _ = rows.iter().try_for_each(|row| writeln!(out, "{row}")).and_then(|()| out.flush());
+}
+
 impl Live<'_> {
     /// Prints the column titles of the lines.
     pub fn begin(legs: &Legs) -> Live<'_> {
@@ -60,22 +66,20 @@ impl Live<'_> {
     pub fn end(&mut self) {
         if self.leg.take().is_some() {
             self.wipe();
-            println!("{}", self.line);
+            show(&[&self.line]);
         }
     }
 
     fn draw(&mut self, rows: &[String]) {
         self.wipe();
-        rows.iter().for_each(|row| println!("{row}"));
+        show(rows);
         self.drawn = rows.len();
-        // a failed flush must not end the flight
-        let _ = std::io::stdout().flush();
     }
 
     /// Erases the last drawing: moves the cursor up and clears the lines below it.
     fn wipe(&mut self) {
         if self.drawn > 0 {
-            print!("\u{1b}[{}A\u{1b}[J", self.drawn);
+            let _ = write!(std::io::stdout(), "\u{1b}[{}A\u{1b}[J", self.drawn);
             self.drawn = 0;
         }
     }

@@ -3,6 +3,9 @@
 
 use std::time::{Instant, SystemTime};
 
+/// A packet that arrives up to this many microseconds before the last timestamp gets the next one.
+const CROWDED_US: u64 = 100;
+
 /// Timestamps of one recording. A change of the system time in flight has no effect on them. A replay thus sees the same times
 /// between packets as the flight. Two successive packets have different timestamps, so that a reader can separate them.
 #[derive(Clone, Copy, Debug)]
@@ -22,7 +25,10 @@ impl Stamps {
     /// The timestamp of a packet received or sent at `host`, µs since 1970.
     pub(super) fn of(&mut self, host: Instant) -> u64 {
         let us = self.epoch_us + host.saturating_duration_since(self.started).as_micros() as u64;
-        let stamp = if self.last == Some(us) { us + 1 } else { us };
+        let stamp = match self.last {
+            Some(last) if (us..us + CROWDED_US).contains(&last) => last + 1,
+            _ => us,
+        };
         self.last = Some(stamp);
         stamp
     }
@@ -54,6 +60,8 @@ mod tests {
         // two packets in the same microsecond, such as a reply and the next arrival
         let [one, two] = [us(400_000), us(400_000)].map(|at| stamps.of(at));
         assert_eq!(two - one, 1);
+        let crowd = [us(500_000); 4].map(|at| stamps.of(at));
+        assert!(crowd.windows(2).all(|pair| pair[1] == pair[0] + 1), "{crowd:?}");
         assert!(first.abs_diff(unix_us()) < 10_000_000);
     }
 }

@@ -59,6 +59,8 @@ pub struct Trainer {
     adam: Adam,
     lambda: f64,
     update: u64,
+    /// Number of failed updates since the last good one.
+    failed: u64,
     /// Sections of the flights for rollouts of the present length.
     stage: Stage,
 }
@@ -108,6 +110,7 @@ impl Trainer {
             coordinates,
             lambda: recipe.lambda,
             update: 0,
+            failed: 0,
             recipe,
             tracks,
             prior,
@@ -242,11 +245,15 @@ impl Trainer {
     /// If more than 20 consecutive updates fail, or the data is too short for a new rollout length.
     pub fn run(&mut self, count: u64) -> Result<Progress, TrainError> {
         let mut sum = Progress::default();
-        let (mut made, mut failed) = (0.0_f64, 0);
-        while made < count as f64 && !self.is_done() {
+        let mut good = 0.0_f64;
+        for _ in 0..count {
+            if self.is_done() {
+                break;
+            }
             match self.one()? {
                 Some((loss, normalised)) => {
-                    failed = 0;
+                    self.failed = 0;
+                    good += 1.0;
                     sum.loss.prediction += loss.prediction;
                     sum.loss.prior += loss.prior;
                     sum.loss.learned += loss.learned;
@@ -254,14 +261,13 @@ impl Trainer {
                     sum.loss.lost += loss.lost;
                     sum.normalised += normalised;
                 }
-                None => failed += 1,
+                None => self.failed += 1,
             }
-            if failed > PATIENCE {
+            if self.failed > PATIENCE {
                 return Err(TrainError::Diverged { update: self.update });
             }
-            made += 1.0;
         }
-        let part = 1.0 / made.max(1.0);
+        let part = 1.0 / good.max(1.0);
         let loss = Loss {
             prediction: sum.loss.prediction * part,
             prior: sum.loss.prior * part,

@@ -71,9 +71,9 @@ pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
     }
     commands.extend(servos::rules(topics, "SERVO_OUTPUT_RAW", mixer, |n| format!("servo{n}_raw")));
     for rule in &mut commands {
-        let of_system = |i: &u16| i.to_be_bytes()[0] == system;
-        let found = topics.instances(&rule.topic).max_by_key(|(_, t)| t.time_s.len());
-        rule.instance = found.map(|(i, _)| i).filter(of_system);
+        let all = topics.instances(&rule.topic);
+        let own = all.filter(|(i, _)| i.to_be_bytes()[0] == system);
+        rule.instance = own.max_by_key(|(_, t)| t.time_s.len()).map(|(i, _)| i);
     }
     out.extend(commands);
     out
