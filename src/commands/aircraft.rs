@@ -28,8 +28,8 @@ enum Command {
     /// Compute trim, modes, control authority, and stability margins with the LQI (linear quadratic controller with integral
     /// action) of a model's aircraft.
     Check(check::Arguments),
-    /// Draw aircraft from a distribution, print their flight characteristics and whether the shipped aircraft lie within them,
-    /// and write their files.
+    /// Draw aircraft from a distribution, print quantiles of their flight characteristics, state whether the shipped aircraft
+    /// lie within these, and write the files of the drawn aircraft.
     Draw(draw::Arguments),
     /// Write a model as an aircraft of another program.
     Export(export::Arguments),

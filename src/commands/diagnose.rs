@@ -48,8 +48,8 @@ pub struct Arguments {
     /// Write a report as one HTML page to this file.
     #[arg(long)]
     report: Option<PathBuf>,
-    /// Number of bootstrap draws under the null hypothesis (no effect is missing); they give the thresholds above which an
-    /// effect counts as missing.
+    /// Number of bootstrap draws under the null hypothesis (no effect is missing); they give the thresholds that the evidence
+    /// for a missing effect must exceed.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(20..))]
     nulls: u16,
     /// Seed of all random draws.

@@ -88,13 +88,13 @@ impl<'a> Source<'a> {
         self.agent.ok_or(SetupError::Untrained)
     }
 
-    /// A planner with `settings` and the user's changes, without a base controller.
+    /// A planner with `settings` and the user's changes. It has no base controller, that is, no controller that flies on after
+    /// the end of a plan.
     fn planner(&self, name: &'static str, settings: cem::Settings) -> Result<cem::Cem, SetupError> {
         self.planner_over(None, name, settings)
     }
 
-    /// A planner with the model's LQI as base controller, which flies on after the end of each plan. Without a policy, no
-    /// policy's plans are among the candidates.
+    /// A planner with the model's LQI as base controller. Without a policy, no policy's plans are among the candidates.
     fn planner_over_lqi(
         &self,
         name: &'static str,

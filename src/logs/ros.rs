@@ -219,8 +219,8 @@ impl Reader<'_> {
         if read as u64 == length { Ok(()) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
     }
 
-    /// Notes the recorder's time of a message, ns since 1970. If a damaged place precedes the message, the time that was lost
-    /// there is now known.
+    /// Notes the recorder's time of a message, ns since 1970. If a damaged place precedes the message, computes the time that was
+    /// lost there.
     fn passed(&mut self, log_ns: u64) {
         if let Some(hole) = self.holes.last_mut().filter(|hole| hole.is_nan()) {
             let last = self.last_ns.unwrap_or(log_ns);

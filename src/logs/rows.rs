@@ -84,13 +84,13 @@ impl Rows {
         self.counted_s = usable.map(|row| row.time_s).or(self.counted_s);
     }
 
-    /// Counts the usable and the unusable ones of `rows` without keeping any.
+    /// Counts the usable and the unusable rows among `rows` without keeping any.
     pub fn counted(mut self, rows: &[Sample]) -> Rows {
         rows.iter().enumerate().for_each(|(i, row)| self.count(i + 1, Some(*row)));
         self
     }
 
-    /// Keeps the usable ones of `rows`, and counts all. The result uses the memory of `rows`, because there may be too little
+    /// Keeps the usable rows among `rows`, and counts all. The result uses the memory of `rows`, because there may be too little
     /// for a second table.
     pub fn taken(mut self, mut rows: Vec<Sample>) -> Rows {
         let mut kept = 0_usize;
@@ -152,8 +152,7 @@ impl Rows {
         Some(sample)
     }
 
-    /// Whether too many rows were dropped for this tolerance: the number of the first dropped row, or `None` if the log is
-    /// accepted.
+    /// The number of the first dropped row if so many rows were dropped that the log is refused; `None` if it is accepted.
     pub fn refused(&self, tolerance: Tolerance) -> Option<usize> {
         let poor = self.dropped as f64 > REFUSED_SHARE * self.total as f64;
         let first = self.dropped_rows.first().copied();

@@ -142,7 +142,7 @@ fn header(view: &[u8]) -> Option<(usize, u8)> {
 }
 
 impl Reader {
-    /// What begins at the beginning of `view`.
+    /// What `view` begins with.
     ///
     /// A record is valid if the records that follow it are valid too. After a damaged place, it and the records that follow must
     /// moreover be data records with the sizes of their topics.
@@ -161,8 +161,8 @@ impl Reader {
         if fits { Place::Record(len) } else { Place::Damage }
     }
 
-    /// Whether valid records follow a record of this kind and `len` bytes. `rest` begins after it. Records that were checked
-    /// together with the record before are not checked again, unless this record is not a data record.
+    /// Whether valid records follow a record of this kind and `len` bytes. `rest` begins after this record. If it is a data
+    /// record, the following records that were already checked for the record before are not checked again.
     fn goes_on(&mut self, rest: &[u8], len: usize, kind: u8) -> bool {
         let seen = match self.ahead {
             Ahead { records, bytes } if kind == b'D' && records > 0 && bytes >= len => {

@@ -116,7 +116,8 @@ fn make_wrong(effects: &mut toml::Table, seed: u64) {
             let mut random = stream(seed, &[[DRAW].as_slice(), &path].concat());
             let unit: f64 = StandardNormal.sample(&mut random);
             let wrong = possible(id, name, value * (1.0 + WRONG * unit.clamp(-2.0, 2.0)));
-            // a smaller prior standard deviation `sd` would hold a fit near the wrong value; without `sd` it is 15 %
+            // a prior standard deviation `sd` below 15 % of the value would hold a fit near the wrong value and is therefore
+            // removed; the default is 15 %
             if number
                 .get("sd")
                 .and_then(toml::Value::as_float)

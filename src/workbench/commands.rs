@@ -1,4 +1,5 @@
-//! The `greylag` commands that correspond to the functions of the workbench page.
+//! The `greylag` commands that do the same as the functions of the workbench page. A session of the workbench has a model and
+//! flights. Fit flights are used to fit the model, hold-out flights to validate the fit, and test flights for a final comparison.
 
 use serde::Serialize;
 
@@ -9,25 +10,26 @@ use greylag_logs::csv::Tolerance;
 use greylag_logs::quoted;
 use greylag_sysid::amend::document::MODEL;
 
-/// The commands that correspond to the present session.
+/// The commands for the present session. A command is empty if the session lacks what it needs.
 #[derive(Clone, Debug, Serialize)]
 pub struct Commands {
     /// Command that summarises the logs; empty without logs.
     pub flights: String,
-    /// Command that compares the models with the fit and hold-out flights; empty without such flights.
+    /// Command that compares the model, and the amended model if there are accepted effects, with the fit and hold-out flights;
+    /// empty without such flights.
     pub compare: String,
-    /// Command that finds missing effects of the model; empty without fit flights.
+    /// Command that finds effects that the model lacks; empty without fit flights.
     pub diagnose: String,
-    /// Command that searches for a formula for the residual; empty without a flight to test the formula.
+    /// Command that searches for a formula for the residual; empty without separate flights for the search and its test.
     pub propose: String,
-    /// Command that amends the model; empty without accepted effects.
+    /// Command that adds the accepted effects to the model; empty without accepted effects.
     pub amend: String,
-    /// Command that compares both models with the test flights; empty without test flights.
+    /// Command that compares the same models with the test flights; empty without test flights.
     pub judge: String,
 }
 
 impl Bench {
-    /// The commands that correspond to the present session.
+    /// The commands for the present session.
     pub(super) fn commands(&self, inner: &Inner) -> Commands {
         let model = quoted(&inner.session.model);
         let logs = |roles: &[Role]| -> String {
@@ -55,7 +57,7 @@ impl Bench {
             true => String::new(),
             false => command,
         };
-        // the workbench always keeps the deflections on the clock of the log
+        // the workbench uses the deflections at the times that the log states for them
         let compare = |logs: &str, roles: &[Role]| {
             let words = inner.reading_words(roles);
             format!("greylag compare --model {model}{amended} --log{logs} --recorded-clock{words}")
@@ -83,8 +85,8 @@ impl Bench {
 }
 
 impl Inner {
-    /// The command that searches for a formula, with the option `own` for the session's written effects; empty if no flight is
-    /// left to test the formula.
+    /// The command that searches for a formula. `own` is the option that names the effects that the user has written in this
+    /// session. Empty if there are too few flights for the search and a test of the formula.
     fn propose_command(&self, own: &str) -> String {
         let Ok(places) = self.searched_places() else { return String::new() };
         let named = |places: Vec<usize>| -> String {
@@ -96,14 +98,15 @@ impl Inner {
         format!("greylag propose --model {model} --log{search} --hold-out{test}{own}{both}")
     }
 
-    /// Options for a command that reads the session's logs.
+    /// Options with which a command reads the session's logs as the session does.
     fn mapping_words(&self) -> String {
         let mapping = self.mapping.file.iter().map(|file| format!(" --mapping {}", quoted(file)));
         let lenient = (self.given.tolerance == Tolerance::Lenient).then(|| " --lenient".to_owned());
         mapping.chain(lenient).chain([self.given.source_words()]).collect()
     }
 
-    /// Options for a command that reads the logs of `roles`, including the option for logs with problems if it is needed.
+    /// Options with which a command reads the logs with these `roles` as the session does. `--despite-problems` is among them if
+    /// a log has problems.
     fn reading_words(&self, roles: &[Role]) -> String {
         let doubtful = |k: &usize| self.flights[*k].as_ref().is_ok_and(|f| f.in_doubt());
         let despite = self.given.despite_problems || self.usable(roles).iter().any(doubtful);

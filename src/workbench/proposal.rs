@@ -1,4 +1,5 @@
-//! Search for a formula for the residual that no effect of the catalogue explains, and design of schedules that distinguish two
+//! Two functions of the workbench. The first searches for a formula for the residual that no effect of the catalogue explains.
+//! The second designs a schedule (a sequence of attitudes and excitations to be flown) with which flights can distinguish two
 //! effects.
 
 use std::fs;
@@ -29,18 +30,18 @@ pub struct Designed {
     pub manoeuvre: String,
     /// Purpose of the manoeuvre.
     pub description: String,
-    /// Sufficient duration of the manoeuvre, s.
+    /// Duration of the manoeuvre that suffices to distinguish them, s.
     pub seconds: f64,
     /// Number of times that the manoeuvre is flown.
     pub times: usize,
     /// Path of the schedule's file.
     pub file: PathBuf,
-    /// The equivalent command.
+    /// The `greylag` command that designs the same schedule.
     pub command: String,
 }
 
 impl Bench {
-    /// Searches for a formula for the unexplained residual of the given model, and stores the result.
+    /// Searches for a formula for the unexplained residual of the session's given model, and stores the result.
     pub(super) fn propose(&self, progress: &Progress) -> Result<(), WorkbenchError> {
         let (key, model, [search, test], with) = {
             let inner = self.lock();
@@ -56,7 +57,8 @@ impl Bench {
         Ok(())
     }
 
-    /// Result of the search for a formula, as `greylag propose --json` writes it; `null` without a search.
+    /// Result of the search for a formula, as `greylag propose --json` writes it; `null` if there was no search with the present
+    /// model and flights.
     pub fn proposal(&self) -> Value {
         let inner = self.lock();
         let key = inner.key(Work::Proposal.word(), &[]);
@@ -64,7 +66,7 @@ impl Bench {
         known.map_or(Value::Null, |(_, value)| value.as_ref().clone())
     }
 
-    /// Starts the design of a schedule that distinguishes two effects.
+    /// Starts the design of a schedule that distinguishes the two effects `between`.
     pub(super) fn start_design(
         self: &Arc<Self>,
         between: [String; 2],
@@ -78,7 +80,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Designs the schedule for the two effects of [`Bench::start_design`].
+    /// Designs the schedule for the two effects that were passed to [`Bench::start_design`], and writes its file.
     #[cfg(feature = "sitl")]
     pub(super) fn design(&self, progress: &Progress) -> Result<(), WorkbenchError> {
         use super::error::io;
@@ -135,14 +137,14 @@ impl Bench {
 }
 
 impl Inner {
-    /// The flights for the search for a formula, then the flights for its test, as in `greylag propose`. Without a hold-out
-    /// flight, the last fit flight is the test flight.
+    /// The flights for the search for a formula, then those for its test, as in `greylag propose`. The former are the fit flights
+    /// and the latter the hold-out flights of the session. Without a hold-out flight, the last fit flight is used for the test.
     pub(super) fn searched(&self) -> Result<[Vec<Reconstruction>; 2], WorkbenchError> {
         let [fit, held] = self.searched_places()?;
         Ok([self.reconstructions(&fit), self.reconstructions(&held)])
     }
 
-    /// Indices of the flights for the search for a formula, then of the flights for its test.
+    /// Indices of the flights in [`searched`](Inner::searched).
     pub(super) fn searched_places(&self) -> Result<[Vec<usize>; 2], WorkbenchError> {
         let (mut fit, held) = (self.usable(&[Role::Fit]), self.usable(&[Role::HoldOut]));
         match (&fit[..], &held[..]) {

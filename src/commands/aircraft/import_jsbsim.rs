@@ -27,15 +27,15 @@ pub struct Jsbsim {
     /// Folder to make, with airframe.toml and model.toml.
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
-    /// True airspeed at which the aircraft's loads are differentiated.
+    /// True airspeed at which the stability and control derivatives are computed.
     #[arg(long, value_name = "MPS")]
     cruise_mps: f64,
-    /// Altitude above mean sea level at which the aircraft's loads are differentiated.
+    /// Altitude above mean sea level at which the stability and control derivatives are computed.
     #[arg(long, value_name = "M", default_value_t = 600.0)]
     altitude_m: f64,
     /// JSBSim property NAME that takes the command KEY or gives the deflection KEY (may be repeated), as for
-    /// `greylag evaluate`. Without this option, properties that differ from the usual ones are found by trying all. NAME may
-    /// be -NAME*SCALE,NAME,….
+    /// `greylag evaluate`. Without this option, properties with unusual names are found by trial. NAME may be
+    /// -NAME*SCALE,NAME,….
     #[arg(long, value_name = "KEY=NAME", value_parser = property)]
     property: Vec<(String, String)>,
     /// Hold a property at a value (may be repeated), for example flaps. The value is stored in the airframe file.

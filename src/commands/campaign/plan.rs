@@ -1,5 +1,5 @@
-//! `greylag campaign plan`: shows the cells of a campaign and their cost. A cell is the command of a stage with one
-//! combination of parameters, such as prior, controller and seed.
+//! `greylag campaign plan`: shows the cells of a campaign and their cost. A campaign is a planned set of runs in stages. A cell
+//! is the command of a stage with one combination of parameters, such as controller and seed.
 
 use std::process::ExitCode;
 

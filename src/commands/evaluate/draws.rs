@@ -69,8 +69,9 @@ pub(super) fn over_draws(
     Ok(ExitCode::SUCCESS)
 }
 
-/// Table of each controller's results over the draws. The mean of a draw is the mean settled error over all targets (mean of
-/// roll and pitch RMSE over the last fifth of a flight, degrees). A draw has a divergence if a target diverged in it.
+/// Table of each controller's results over the draws. The settled error of a target is the mean of roll and pitch RMSE over the
+/// last fifth of the flight, degrees. The mean of a draw is its mean settled error over all targets. A target diverged if its
+/// settled error exceeds 10°. A draw has a divergence if any of its targets diverged.
 fn draws_table(flown: &[Robustness]) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);

@@ -1,5 +1,6 @@
 //! Budgets of `greylag learn`: numbers of flights, of gradient updates and of hidden units. The command learns a model (a
-//! prior with a neural residual) from simulated flights, and then trains a policy in the model.
+//! physical prior with a neural residual) from simulated flights, and then trains a policy in the model. The paper is
+//! \[GSFM26\] (see `src/lib.rs`).
 
 use clap::ValueEnum;
 

@@ -16,8 +16,8 @@ use crate::sysid::flight_path::reconstruction::Reconstruction;
 
 /// Without recent flights, every tenth track is held out, if there are ten or more.
 const HELD_OUT: usize = 10;
-/// Fraction at the end of a track that is held out: of each track of recent flights, or, without recent flights, of each
-/// track if there are fewer than `HELD_OUT`.
+/// Fraction at the end of a track that is held out. It applies to the tracks of recent flights. Without recent flights, it
+/// applies to all tracks if there are fewer than ten.
 const HELD_OUT_PART: f64 = 0.2;
 /// Largest number of copies of a recent flight in the training data.
 const MOST_COPIES: f64 = 50.0;
@@ -131,7 +131,7 @@ impl FlightArguments {
     }
 
     /// The training and validation data if there are recent flights. The training data are the tracks `others` and the recent
-    /// flights. These are repeated until they make up about the requested fraction of all samples.
+    /// flights. Recent flights are repeated until they make up about the requested fraction of all samples.
     fn with_recent(
         &self,
         others: Vec<Track>,

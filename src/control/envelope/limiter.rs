@@ -4,14 +4,14 @@
 //! For each limit a control law gives the deflection of the surface that brings the limited quantity to the limit. The command
 //! is clamped between the deflections for the lower and the upper limit (min/max selection, as in fly-by-wire: Stevens, Lewis
 //! and Johnson, *Aircraft Control and Simulation*, 3rd ed., section 4.6).
-//! The law is that of an exponential control barrier function (Nguyen and Sreenath, ACC 2016). For a quantity x with the limit
-//! x_lim, whose second derivative ẍ depends on the surface, the law
+//! The law is that of an exponential control barrier function (Nguyen and Sreenath, ACC 2016). Let x be the limited quantity and
+//! x_lim its limit. The surface acts on ẍ. The deflection is chosen so that
 //!
 //! ```text
 //! ẍ + 2 ω (ẋ − ẋ_lim) + ω² (x − x_lim) = 0
 //! ```
 //!
-//! brings x to its limit without overshoot. A command between the two deflections is not changed. The model gives ẍ and its
+//! This brings x to its limit without overshoot. A command between the two deflections is not changed. The model gives ẍ and its
 //! change with the deflection, at the state that is predicted for the time at which the command acts. Thus ẍ includes the
 //! effects of rolling, airspeed and gravity.
 

@@ -20,7 +20,7 @@ pub(super) const ALL: usize = STATES + RUDDER_STATES;
 pub(super) struct Gain {
     /// Gain rows of aileron and elevator, rad per unit of each state.
     pub surfaces: SMatrix<f64, 2, STATES>,
-    /// The rudder's part. `None` for an aircraft without a rudder.
+    /// The rows and columns for the rudder. `None` for an aircraft without a rudder.
     pub rudder: Option<RudderGain>,
 }
 

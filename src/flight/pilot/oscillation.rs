@@ -71,10 +71,10 @@ pub(super) struct Oscillation {
 }
 
 impl Oscillation {
-    /// Processes the tick at `time`. `before` and `now` are the commands of the previous tick and of this one. `step` is the
-    /// largest permitted change of a surface command per tick. Returns the oscillating axis and the duration of the
-    /// oscillation, s; `None` without an oscillation. Durations come from the times of the ticks, because an overloaded
-    /// processor skips ticks.
+    /// Processes the tick (control cycle) at `time`. `before` and `now` are the commands of the previous tick and of this one.
+    /// `step` is the largest permitted change of a surface command per tick. Returns the oscillating axis and the duration of the
+    /// oscillation, s; `None` without an oscillation. Durations come from the times of the ticks, because an overloaded processor
+    /// skips ticks.
     pub(super) fn see(
         &mut self,
         time: Time,

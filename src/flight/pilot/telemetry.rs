@@ -52,7 +52,8 @@ pub(super) fn repeats(frame: &Telemetry, earlier: &Telemetry) -> bool {
         && same(&frame.specific_force, &earlier.specific_force)
 }
 
-/// Largest magnitude of the roll angle, rad: π plus a margin for the rounding of a 32-bit quaternion.
+/// Largest magnitude of the roll angle, rad: π plus a margin for the rounding of a 32-bit quaternion. The limit of the pitch
+/// angle is half of it.
 const HALF_TURN: f64 = std::f64::consts::PI + 1e-3;
 
 #[cfg(test)]

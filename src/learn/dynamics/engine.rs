@@ -1,5 +1,6 @@
-//! Computes the loss of a minibatch and its gradient. A minibatch is a set of windows (short sections of flights); in each
-//! window the model is simulated from the recorded start (a rollout) and compared with the recorded states.
+//! Computes the loss of a minibatch and its gradient. A minibatch is a set of windows, which are short sections of the tracks
+//! (recorded flights). In each window the model is simulated from the recorded start (a rollout) and compared with the recorded
+//! states.
 
 use crate::dynamics::kernel::Double;
 #[cfg(target_arch = "aarch64")]

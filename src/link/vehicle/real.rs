@@ -1,8 +1,8 @@
 //! The `px4` and `ardupilot` profiles: the vehicle is a real flight controller, whose decisions have priority.
 //!
 //! In this module "controller" means the flight controller, and "stack" its software, PX4 or ArduPilot. The controller flies
-//! until a client requests engagement, that is, until the companion shall fly. The companion then commands the controller
-//! through the interface of its stack (see `profile`). At the first fault the companion returns control authority.
+//! until a client requests that the companion flies (engagement). The companion then commands the controller through the
+//! interface of its stack (see `profile`). At the first fault the companion returns control authority.
 
 pub mod air_data;
 mod assembly;
@@ -152,7 +152,7 @@ impl Real {
         self.notices.push_back(Notice::Released(reason));
     }
 
-    /// The encoded message that commands `demand` to the controller, in reply to the state with vehicle time `time`. Empty if no
+    /// The encoded message that sends `demand` to the controller, in reply to the state with vehicle time `time`. Empty if no
     /// command is due. Begins engagement if the companion is armed, and returns control authority if `demand` has a fault.
     pub fn answer(&mut self, host: Duration, time: Time, demand: &Demand) -> Vec<u8> {
         let Outputs::Armed(command) = demand.outputs else {

@@ -173,7 +173,7 @@ fn attitude_target(status: &Status, scene: &Scene) -> MavMessage {
     })
 }
 
-/// Bits of ATTITUDE_TARGET_TYPEMASK that tell the receiver to ignore the body rates, and the attitude.
+/// Bits of ATTITUDE_TARGET_TYPEMASK. The first tell the receiver to ignore the body rates, the second to ignore the attitude.
 const RATES_IGNORED: u8 = 0b111;
 const ATTITUDE_IGNORED: u8 = 1 << 7;
 

@@ -9,8 +9,8 @@ pub type Parts = Vec<(usize, Expression)>;
 
 /// For each of `count` parameters, whether it counts as linear in all of `formulas`.
 ///
-/// A parameter within a function, a power or a denominator does not. Of several parameters that are multiplied, only the
-/// leftmost does.
+/// A parameter within a function, a denominator or a power other than 1 does not count as linear. Of several parameters that
+/// are multiplied, only the leftmost one counts as linear.
 pub fn linear(formulas: &[Expression], count: usize) -> Vec<bool> {
     let mut linear = vec![true; count];
     loop {

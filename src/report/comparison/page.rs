@@ -1,5 +1,6 @@
-//! The page on a comparison of models with flights. A channel is a force or moment coefficient that model and flight are
-//! compared in. A regime is a flight condition, such as a range of the angle of attack.
+//! The page on a comparison of models with flights. A channel is a force, a moment or a rate in which model and flight are
+//! compared. The unexplained share is the part of a channel's variation that neither model nor sensor noise explains. A regime
+//! is a flight condition, such as a range of the angle of attack.
 
 use crate::comparison::ComparisonReport;
 use crate::comparison::{place, regimes, tables, traces};

@@ -1,4 +1,4 @@
-//! Bar chart: one quantity for several items, with horizontal bars. Each item has one bar per model, below each other.
+//! Bar chart: one quantity for several items, with horizontal bars. Each item has one bar per model, one below the other.
 
 use crate::Style;
 use crate::kit::html::escape;
@@ -14,7 +14,7 @@ pub struct Bars {
     pub keys: Vec<(String, Style)>,
     /// The groups, top to bottom.
     pub groups: Vec<BarGroup>,
-    /// Value at which a bar has its full length. The bar of a larger value has full length too and a mark.
+    /// Value at which a bar has its full length. The bar of a larger value has full length too, and is marked.
     pub full: f64,
 }
 

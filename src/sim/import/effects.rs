@@ -13,8 +13,8 @@ pub(super) type Effect = (&'static str, Vec<Estimate>);
 
 const SOURCE: &str = "central difference of JSBSim's loads";
 
-/// Limits the coefficients of an effect to the range that is plausible for an aircraft of `size`. A text on each coefficient
-/// that this changes is added to `left_out`.
+/// Limits the coefficients of an effect to the range that is plausible for an aircraft of `size`. A text on each changed
+/// coefficient is added to `left_out`.
 fn bounded(effect: &str, estimates: &mut [Estimate], size: &Size, left_out: &mut Vec<String>) {
     let coefficients = describe(effect).map_or(&[][..], |about| about.coefficients);
     for estimate in estimates {

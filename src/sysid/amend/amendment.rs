@@ -146,8 +146,8 @@ fn dropped(before: &GreyBox, after: &GreyBox) -> Vec<(String, &'static str)> {
 /// `progress` receives the stages and may cancel.
 ///
 /// # Errors
-/// An effect cannot join the model, a flight's sampling interval is not usable, the flights do not allow a fit (see
-/// `AmendError`), or `progress` cancelled.
+/// If an effect cannot be added to the model, a flight's sampling interval is not usable, the flights do not allow a fit (see
+/// `AmendError`), or `progress` cancels.
 pub fn amend(
     model: &GreyBox,
     flights: &[Reconstruction],

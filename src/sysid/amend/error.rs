@@ -32,8 +32,8 @@ pub enum AmendError {
          or cut one into parts with `greylag logs convert`"
     )]
     TooFewFlights {
-        /// Number of flights that are long enough to be predicted. If the number of all flights is already too small, that
-        /// number.
+        /// Number of flights that are long enough to be predicted. If the total number of flights is already too small, this is
+        /// the total number.
         flights: usize,
         /// Smallest number of flights for the cross-validation.
         needed: usize,

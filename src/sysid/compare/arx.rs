@@ -89,8 +89,8 @@ pub enum ArxError {
         /// Number of flights.
         flights: usize,
     },
-    /// No flight is as long as the shortest horizon (duration of a forecast), or the flights other than one are too short for a
-    /// fit.
+    /// No flight is as long as the shortest horizon (duration of a forecast), or for each such flight the other flights are too
+    /// short for a fit.
     #[error(
         "cannot choose the order of a linear forecast (ARX): none of {flights} flights is longer than {shortest_s} s, or those \
          beside it are too short for a fit; give longer flights"

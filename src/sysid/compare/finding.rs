@@ -84,8 +84,8 @@ fn excludes_zero([low, high]: [f64; 2]) -> bool {
     low > 0.0 || high < 0.0
 }
 
-/// The bins of the variable that explains the largest fraction of the residual's variance, after the reduction by
-/// `CIRCUMSTANCE_MARGIN`. `None` if that fraction is not above `SHARE_FLOOR`.
+/// The bins of the variable that explains the largest fraction of the residual's variance. The fractions of time, altitude and
+/// flight are reduced by `CIRCUMSTANCE_MARGIN` first. `None` if the largest fraction is not above `SHARE_FLOOR`.
 fn most_informative(bins: &[RegimeBins]) -> Option<&RegimeBins> {
     use RegimeVariable::{Altitude, Flight, Time};
     let worth = |b: &RegimeBins| {
@@ -96,8 +96,8 @@ fn most_informative(bins: &[RegimeBins]) -> Option<&RegimeBins> {
     (worth(best) > SHARE_FLOOR).then_some(best)
 }
 
-/// Whether the residual is rather a constant than a function of the variable: the variance that the variable explains is less
-/// than a tenth of the squared mean.
+/// Whether the residual is nearly constant: the variance that the variable explains is less than a tenth of the squared mean of
+/// the residual.
 fn is_constant(residuals: &[Residual], decisive: &RegimeBins) -> bool {
     let count = residuals.len() as f64;
     let mean = residuals.iter().map(|r| r.value).sum::<f64>() / count;

@@ -1,4 +1,4 @@
-//! Intake: resamples a log to uniform time steps, one track for each stretch without gaps.
+//! Intake of a log for flight-path reconstruction: resamples it to uniform time steps. Each stretch without gaps becomes a track.
 
 mod channels;
 mod stretches;
@@ -13,27 +13,26 @@ use greylag_physics::{Command, Controls, Sensors};
 use stretches::{gap, step, stretches};
 use track::track;
 
-/// Smallest number of samples of attitude and airspeed in a stretch that is used.
+/// A stretch with fewer samples of attitude or airspeed is left out.
 const FEWEST: usize = 10;
 
-/// Largest number of left-out stretches that have a note of their own. A log with many gaps can have thousands of
-/// stretches.
+/// Largest number of left-out stretches that get their own note, because a log with many gaps can have thousands.
 const NAMED: usize = 8;
 
-/// Note on a log without vanes.
+/// Note on a log whose flow angles are estimates.
 const ESTIMATED: &str = "α and β of this log are the flight controller's estimates, not measurements: left out. If the \
                          aircraft has vanes, map alpha_rad and beta_rad to them.";
 
-/// A log on uniform clocks.
+/// A log after resampling.
 #[derive(Clone, Debug)]
 pub struct Log {
     /// Time between samples, s.
     pub step: f64,
-    /// Stretches without gaps.
+    /// The stretches without gaps that are used.
     pub tracks: Vec<Track>,
-    /// Sensors that the log contains.
+    /// Optional sensors that the log contains.
     pub has: Present,
-    /// Measurement periods of the sensors.
+    /// Times between the measurements of the sensors.
     pub periods: Periods,
     /// Motion of the rudder, if it moves.
     pub rudder: Option<RudderMotion>,
@@ -73,7 +72,7 @@ pub struct Periods {
     pub velocity: f64,
 }
 
-/// Extent in time of a flight, from its first to its last stretch.
+/// Time interval of a flight, from the start of its first stretch to the end of its last.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Span {
     /// Middle of the flight on the log's clock, s.
@@ -82,12 +81,13 @@ pub struct Span {
     pub length: f64,
 }
 
-/// A stretch without gaps, as measured; a missing measurement is NaN. Units as in [`Sample`](greylag_logs::Sample).
+/// The measurements in a stretch without gaps, resampled. A missing measurement is NaN. Units are those of
+/// [`Sample`](greylag_logs::Sample).
 #[derive(Clone, Debug, Default)]
 pub struct Track {
     /// Time of the first sample, s.
     pub start: f64,
-    /// Extent in time of the whole flight.
+    /// Time interval of the whole flight.
     pub span: Span,
     /// Body rates p, q, r; never missing.
     pub rates: Vec<[f64; 3]>,
@@ -117,16 +117,16 @@ impl Track {
         self.rates.len()
     }
 
-    /// Time of sample `k` on the log's clock, s, for the sampling interval `step` (s).
+    /// Time of sample `k` on the log's clock, s. `step` is the time between samples, s.
     pub fn time(&self, k: usize, step: f64) -> f64 {
         self.start + k as f64 * step
     }
 }
 
-/// Converts a log to tracks: splits the log at gaps, resamples the channels and holds the commands.
+/// Converts a log to tracks: splits it at gaps, interpolates the measurements, and holds each command until the next one.
 ///
 /// # Errors
-/// A required channel is missing, the log contains no flight, or no stretch is long enough.
+/// If a required channel is missing, the log contains no flight, or no stretch can be used.
 pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructError> {
     let channels = Channels::of(flight);
     channels.check(&options.name)?;
@@ -184,7 +184,7 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
     Ok(log)
 }
 
-/// Notes on the stretches `left_out`: start and end (s), and the reason.
+/// Notes on the stretches `left_out`. An entry has the start and end of a stretch, s, and the reason.
 fn unused(left_out: &[([f64; 2], &str)]) -> Vec<String> {
     let note = |([start, end], why): &([f64; 2], &str)| {
         format!("The stretch from {start:.2} s to {end:.2} s is left out: {why}.")

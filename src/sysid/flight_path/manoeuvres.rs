@@ -1,10 +1,11 @@
-//! Classification of a flight into manoeuvres by rates, surfaces, bank and throttle.
+//! Division of a flight into manoeuvres, by body rates, surfaces, bank angle and throttle.
 //!
-//! Root mean squares over the second around a sample are compared with bounds. A sample belongs to a roll manoeuvre if the
-//! roll rate, or the aileron about its mean, exceeds its bound. A sample belongs to a pitch manoeuvre if the rate of the
-//! pitch angle, or the elevator about its mean, exceeds its bound. Any other sample belongs to a change of thrust if the
-//! throttle moves, or else to a turn if the bank angle is large, or else to steady flight. Manoeuvres shorter than half a
-//! second join the preceding one.
+//! Root mean squares (RMS) and standard deviations are computed over the second around a sample and compared with bounds. A
+//! sample belongs to a roll manoeuvre if the RMS roll rate or the standard deviation of the aileron exceeds its bound. It belongs
+//! to a pitch manoeuvre if the RMS rate of the pitch angle or the standard deviation of the elevator exceeds its bound. Any other
+//! sample belongs to a change of thrust if the standard deviation of the throttle exceeds its bound. The remaining samples belong
+//! to a turn if the bank angle is large, otherwise to steady flight. A manoeuvre shorter than half a second is added to the one
+//! before.
 
 use crate::flight_path::reconstruction::{Instant, Reconstruction, Segment};
 
@@ -12,31 +13,31 @@ use crate::flight_path::reconstruction::{Instant, Reconstruction, Segment};
 const ROLL_RATE: f64 = 0.15;
 /// RMS rate of the pitch angle above which a sample belongs to a pitch manoeuvre, rad/s.
 const PITCH_RATE: f64 = 0.08;
-/// RMS deflection about its mean above which a sample belongs to a roll or pitch manoeuvre, rad.
+/// Standard deviation of the deflection above which a sample belongs to a roll or pitch manoeuvre, rad.
 const DEFLECTION: f64 = 0.03;
-/// RMS throttle about its mean (0..1) above which a sample belongs to a change of thrust.
+/// Standard deviation of the throttle (0..1) above which a sample belongs to a change of thrust.
 const THROTTLE: f64 = 0.05;
-/// Bank angle above which a sample belongs to a turn, rad.
+/// Bank angle above which a sample without other manoeuvre belongs to a turn, rad.
 const BANK: f64 = 0.26;
-/// Length of the window of the root mean squares, s.
+/// Time over which root mean squares and standard deviations are computed, s.
 const WINDOW: f64 = 1.0;
-/// Shortest stretch of one manoeuvre, s.
+/// Shortest manoeuvre, s.
 const SHORTEST: f64 = 0.5;
 
 /// Kind of a manoeuvre.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ManoeuvreKind {
-    /// Small bank angle; neither surfaces nor throttle move.
+    /// The bank angle is small, and neither surfaces nor throttle move.
     Steady,
-    /// Large bank angle; neither surfaces nor throttle move.
+    /// The bank angle is large, and neither surfaces nor throttle move.
     Turn,
-    /// The throttle moves, the surfaces do not.
+    /// The throttle moves, and the surfaces do not.
     Thrust,
     /// The ailerons move, or the roll rate is large.
     Roll,
     /// The elevator moves, or the pitch angle changes.
     Pitch,
-    /// Roll and pitch move together.
+    /// The conditions of a roll and of a pitch manoeuvre hold at once.
     RollAndPitch,
 }
 
@@ -51,7 +52,7 @@ pub struct Manoeuvre {
     pub kind: ManoeuvreKind,
 }
 
-/// The manoeuvres of a flight in order of time, without gaps inside its segments.
+/// The manoeuvres of a flight in order of time. In each segment of the flight they follow each other without gaps.
 pub fn manoeuvres(flight: &Reconstruction) -> Vec<Manoeuvre> {
     flight.segments.iter().flat_map(|s| of_segment(s, flight.step_s)).collect()
 }
@@ -107,7 +108,8 @@ fn kinds(instants: &[Instant], step: f64) -> Vec<ManoeuvreKind> {
         .collect()
 }
 
-/// Square root of the mean square less `share` times the squared mean, over `half` samples on each side of a sample.
+/// For each sample, √(mean square − `share` × squared mean) of the quantity `get`, over the sample and `half` samples on each
+/// side.
 fn root_mean_square(
     instants: &[Instant],
     half: usize,

@@ -1,4 +1,5 @@
-//! Flight path of a stretch: attitude, velocity and gust at every sample, and the mean wind.
+//! Flight path of a stretch of flight without gaps: attitude, velocity and gust at every sample, and the mean wind. The
+//! flight-path reconstruction estimates it.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -18,15 +19,15 @@ pub struct Path {
     pub attitude: Vec<Matrix3<f64>>,
     /// Velocity over ground, earth axes, m/s.
     pub velocity: Vec<Vector3<f64>>,
-    /// Velocity of the air over ground less the mean wind, earth axes, m/s.
+    /// Gust: velocity of the air over ground minus the mean wind, earth axes, m/s.
     pub gust: Vec<Vector3<f64>>,
     /// Mean wind: velocity of the air over ground, earth axes, m/s.
     pub wind: Vector3<f64>,
 }
 
 impl Path {
-    /// Initial guess without wind, from the measured attitude, airspeed and flow angles. A missing measurement is replaced by the
-    /// preceding one.
+    /// Initial guess without wind and gusts, from the measured attitude, airspeed and flow angles. A missing measurement is
+    /// replaced by the one before.
     pub fn guess(track: &Track) -> Path {
         let course = track.velocity.iter().find(|v| v[0].is_finite() && v[1].is_finite());
         let first = |mut values: Box<dyn Iterator<Item = f64> + '_>, default: f64| {
@@ -69,8 +70,8 @@ impl Path {
         path
     }
 
-    /// Sum and number of the differences between the measured velocities over ground of `track` and the path's velocities,
-    /// m/s. If the path has no wind, the mean difference is an estimate of the wind.
+    /// Sum and number of the differences between the measured velocities over ground in `track` and those of the path, m/s. For a
+    /// path without wind, the mean difference is an estimate of the wind.
     pub fn wind_left(&self, track: &Track) -> (Vector3<f64>, f64) {
         let mut sum = (Vector3::zeros(), 0.0);
         for (measured, own) in track.velocity.iter().zip(&self.velocity) {
@@ -82,13 +83,13 @@ impl Path {
         sum
     }
 
-    /// Changes the wind of a path without wind to `wind` (m/s, earth axes). The motion relative to the air does not change.
+    /// Sets the mean wind of a path without wind to `wind` (m/s, earth axes). The velocity relative to the air does not change.
     pub fn carry(&mut self, wind: Vector3<f64>) {
         self.wind = wind;
         self.velocity.iter_mut().for_each(|v| *v += wind);
     }
 
-    /// Changes sample `k` by a rotation (rad, body axes), a velocity and, if `by` has nine components, a gust (m/s,
+    /// Changes sample `k` by `by`: a rotation vector (rad, body axes), a velocity and, if `by` has nine components, a gust (m/s,
     /// earth axes).
     pub fn shift<const N: usize>(&mut self, k: usize, by: &[f64; N]) {
         let three = |i: usize| Vector3::new(by[i], by[i + 1], by[i + 2]);
@@ -110,7 +111,7 @@ impl Path {
     }
 }
 
-/// α and β, rad, of the velocity `u` relative to the air (body axes).
+/// α and β (rad) that belong to the velocity `u` relative to the air, in body axes.
 pub fn flow_angles(u: &Vector3<f64>) -> [f64; 2] {
     let v = u.norm().max(1e-9);
     [u.z.atan2(u.x), (u.y / v).clamp(-1.0, 1.0).asin()]

@@ -1,5 +1,5 @@
-//! Correction of flights with the constants in a model's file: rotates the measured axes to the body axes, removes sensor
-//! errors, and sets the trims of the flight in the model.
+//! Correction of flights with the constants that a model's file states for them. The correction rotates measurements to the body
+//! axes, removes sensor errors, and adds the trims of the flight (offsets of coefficients) to the model.
 
 use greylag_model::known::{FlightConstants, SENSORS};
 use greylag_model::{GreyBox, Known};
@@ -10,14 +10,14 @@ use crate::per_flight::askew::{self, Turning};
 use crate::per_flight::trims;
 use crate::weak_form::prepared::Prepared;
 
-/// Index of the state to which each sensor error is added. The error of the airspeed is relative to the airspeed.
+/// For each sensor error, the index of the state that it changes. The error of the airspeed is a fraction of the airspeed.
 const ADDED_TO: [usize; SENSORS.len()] = [AIRSPEED, 3, 4, 5, 6, 7];
 const AIRSPEED: usize = 2;
 
 /// A corrected flight, and the model with the trims of this flight.
 #[derive(Clone, Debug)]
 pub struct KnownFlight {
-    /// The model with the trims of the flight and without any other constants of flights.
+    /// The model with the trims of the flight, without the constants that its file states for flights.
     pub model: GreyBox,
     /// The flight in body axes, with the sensor errors removed.
     pub flight: Prepared,
@@ -25,7 +25,7 @@ pub struct KnownFlight {
 }
 
 impl KnownFlight {
-    /// `flight` corrected with its constants in the file of `model`; `None` if the file has no constants for this flight.
+    /// `flight` after correction with the constants that the file of `model` states for it; `None` if the file states none.
     pub fn of(model: &GreyBox, flight: &Prepared) -> Option<KnownFlight> {
         let own = model.known.of(&flight.name)?;
         let added = Added { own: own.clone(), turning: flight.turning };
@@ -34,14 +34,14 @@ impl KnownFlight {
         Some(KnownFlight { model: with_trims(model, &own), flight, added })
     }
 
-    /// Converts a predicted state to the state that the sensors of the flight would measure with their errors.
+    /// Converts a predicted state to the one that the sensors of the flight would measure.
     pub fn as_measured(&self, state: [f64; 8]) -> [f64; 8] {
         let by = self.added.to(&state);
         std::array::from_fn(|k| state[k] + by[k])
     }
 }
 
-/// Measurement errors that are added to the state of a flight.
+/// The measurement errors of a flight: misalignment of the axes, and sensor errors.
 #[derive(Clone, Debug)]
 struct Added {
     own: FlightConstants,
@@ -71,12 +71,12 @@ impl Added {
     }
 }
 
-/// `model` with the trims of a flight added as coefficients.
+/// `model` with the trims in `own`, and without the constants that its file states for flights.
 fn with_trims(model: &GreyBox, own: &FlightConstants) -> GreyBox {
     let mut bare = model.clone();
     bare.known = Default::default();
     let Some(values) = own.trims else { return bare };
-    // a model that already has trims belongs to a fit: the fit estimates the trims, so they are not set here
+    // if the model has trims already, they are not set here, because a fit is estimating them
     match trims::joined(&bare) {
         Ok(mut with) => {
             trims::set(&mut with, &values);
@@ -86,7 +86,8 @@ fn with_trims(model: &GreyBox, own: &FlightConstants) -> GreyBox {
     }
 }
 
-/// `flights` corrected for the axes' misalignment and the sensor errors in `known`, and the names of the corrected flights.
+/// `flights` after correction for the misalignment of the axes and the sensor errors in `known`, and the names of the flights
+/// that were corrected.
 pub fn put_right(known: &Known, flights: &[Reconstruction]) -> (Vec<Reconstruction>, Vec<String>) {
     let mut named = Vec::new();
     let one = |flight: &Reconstruction| {
@@ -107,14 +108,14 @@ pub fn put_right(known: &Known, flights: &[Reconstruction]) -> (Vec<Reconstructi
     (right, named)
 }
 
-/// Names of the flights for which `known` has trims.
+/// Names of those `flights` for which `known` has trims.
 pub fn trimmed<'a>(known: &Known, flights: &'a [Reconstruction]) -> Vec<&'a str> {
     let has = |f: &&Reconstruction| known.of(&f.name).is_some_and(|own| own.trims.is_some());
     flights.iter().filter(has).map(|f| f.name.as_str()).collect()
 }
 
-/// Note that a search for missing effects ignores constants in `known`, with the names of those `flights` that have such
-/// constants. `None` if there are none.
+/// A note that a search for missing effects ignores the constants in `known`, with the names of the `flights` that have such
+/// constants. `None` if none has.
 pub fn not_used(known: &Known, flights: &[&Reconstruction]) -> Option<String> {
     let has = |f: &&&Reconstruction| known.of(&f.name).is_some();
     let names: Vec<&str> = flights.iter().filter(has).map(|f| f.name.as_str()).collect();

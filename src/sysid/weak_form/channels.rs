@@ -1,15 +1,17 @@
-//! Channels in which models are compared, and regime variables that locate a residual in the flight envelope.
+//! Channels (forces, moments and rates) in which models are compared with flights, and regime variables, such as the angle of
+//! attack, which describe the flight condition.
 
 use serde::Serialize;
 
-/// A channel in which a model is compared.
+/// A channel in which measured and predicted values are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 pub enum ChannelId {
-    /// Drag less thrust along the airflow, N, positive backwards. Accelerometers do not distinguish drag from thrust.
-    /// `physics::Channel::Drag` of an effect is drag without thrust.
+    /// Drag minus the component of thrust opposite to it, N, positive backwards. Accelerometers do not distinguish drag from
+    /// thrust.
+    /// The channel `physics::Channel::Drag` of an effect is the drag alone.
     #[serde(rename = "D")]
     Drag,
-    /// Lift including the component of thrust, N, positive upwards.
+    /// Lift plus the component of thrust along it, N, positive upwards.
     #[serde(rename = "L")]
     Lift,
     /// Side force, N, positive to the right.
@@ -90,7 +92,7 @@ impl ChannelId {
     }
 }
 
-/// A quantity that locates a window in the flight envelope.
+/// A quantity that describes the flight condition in a window, a short stretch of flight over which data are averaged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RegimeVariable {

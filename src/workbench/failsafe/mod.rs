@@ -1,5 +1,6 @@
-//! Interactive failsafe scenarios. The user selects a fault, and the companion's pilot flies the scenario in lockstep. The page
-//! shows who was in control at each time, which texts were sent, and which rules of flight held.
+//! The workbench's page on failsafes. The user selects a fault. A flight with this fault is then simulated, with the pilot of the
+//! companion in control. The page shows who was in control at each time, which texts were sent, and which flight rules the flight
+//! violated.
 
 mod answer;
 mod bands;
@@ -17,25 +18,26 @@ use greylag_sim::faults::policies::{Policy, policies};
 use greylag_sim::faults::search::judged;
 use greylag_sim::faults::{CompanionFactory, FaultsError, Scenario, Witnessed};
 
-/// Makes companions with a controller; the error is a message for the page.
+/// Function that makes companions with a controller. Its error is a message for the page.
 type Make = Box<dyn Fn(ControllerKind) -> Result<CompanionFactory, String> + Send + Sync>;
 /// Stack size of the thread that designs a controller, bytes. Dual numbers need a large stack in an unoptimised build.
 const STACK: usize = 16 << 20;
 
-/// Simulates the scenarios that the page requests.
+/// Simulates the flights that the page requests.
 pub struct Failsafes {
     make: Make,
-    /// Companions by controller; they are kept because the design of a controller takes time.
+    /// Companions by the name of their controller. They are kept because the design of a controller takes time.
     made: Mutex<HashMap<&'static str, Arc<CompanionFactory>>>,
 }
 
-/// The result of a flight, with the rules of flight.
+/// The result of a flight, and the flight rules.
 struct Flown {
     scenario: Scenario,
     controller: ControllerKind,
     witnessed: Witnessed,
     rules: Vec<Policy>,
-    /// Smallest distance of each rule (at most 1, negative if broken) and its time, s; `None` if the rule does not apply.
+    /// For each rule, the smallest robustness (normalised margin, at most 1, negative if the flight violates the rule) and its
+    /// time, s. `None` if the rule does not apply.
     judged: Vec<Option<(f64, f64)>>,
 }
 
@@ -44,20 +46,21 @@ struct Flown {
 pub struct Answer {
     /// The page, as HTML.
     pub html: String,
-    /// Whether a value of the form was invalid; then there was no flight.
+    /// Whether a value in the form was invalid. No flight was then simulated.
     pub refused: bool,
 }
 
 impl Failsafes {
-    /// Makes the failsafe simulation with the companions that `make` returns.
+    /// A simulation that flies with the companions that `make` returns.
     pub fn new(
         make: impl Fn(ControllerKind) -> Result<CompanionFactory, String> + Send + Sync + 'static,
     ) -> Failsafes {
         Failsafes { make: Box::new(make), made: Mutex::default() }
     }
 
-    /// The page for the form fields in `query`, pairs of name and value; a missing field has its default. If a value is invalid
-    /// or the flight fails, the page shows the error.
+    /// Simulates the flight that `query` describes, and returns the page. `query` has the form's fields as pairs of name and
+    /// value; a missing field has its default value. If a value is invalid or the flight cannot be simulated, the page shows the
+    /// error.
     pub fn page(&self, query: &[(String, String)]) -> Answer {
         let (form, unknown) = Form::of(query);
         let chosen = match unknown {

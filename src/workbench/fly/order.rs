@@ -1,4 +1,5 @@
-//! Orders for simulator flights, and the commands that execute them.
+//! Orders of the workbench's user for simulated flights, and the commands that execute them. A schedule is a sequence of
+//! attitudes and excitations to be flown.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -11,24 +12,25 @@ use greylag_control::ControllerKind;
 use greylag_logs::quoted;
 use greylag_manoeuvres::menu::{self, MENU};
 
-/// Name of the default schedule of `greylag demo`.
+/// Name in an order for the default schedule of `greylag demo`.
 pub const ATTITUDES: &str = "attitudes";
-/// Subfolder of the session's folder for schedules.
+/// Name of the subfolder for schedules in the session's folder.
 pub const SCHEDULES: &str = "schedules";
-/// Aircraft that the simulator contains.
+/// Names of the aircraft that the simulator contains.
 pub const AIRCRAFT: [&str; 4] = ["x8", "aerosonde", "x8-elevons", "c172p"];
 
-/// Order for a simulator flight.
+/// Order for a simulated flight.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Order {
-    /// Name of the schedule: `attitudes`, a manoeuvre of the list, or a schedule of the session.
+    /// Name of the schedule: `attitudes`, a standard manoeuvre, or a schedule that was designed in this session.
     pub schedule: String,
-    /// Name of the controller, which is designed from the session's model.
+    /// Name of the controller. It is designed from the session's model.
     pub controller: String,
-    /// Name of the simulated aircraft.
+    /// Name of the simulated aircraft, one of [`AIRCRAFT`].
     pub aircraft: String,
-    /// Effects hidden in the aircraft, each ID=AMPLITUDE, separated by spaces.
+    /// Effects that are added to the simulated aircraft and that the model lacks. Each is written as ID=AMPLITUDE; spaces
+    /// separate them.
     #[serde(default)]
     pub hide: String,
     /// Turbulence severity, 1 to 7 (3 light, 4 moderate, 6 severe); `None` for calm air.
@@ -38,17 +40,17 @@ pub struct Order {
     pub seed: u32,
 }
 
-/// A schedule for selection by the user.
+/// A schedule that the user can select.
 #[derive(Clone, Debug, Serialize)]
 pub struct Choice {
-    /// Identifier of the schedule in an [`Order`].
+    /// Name of the schedule in an [`Order`].
     pub id: String,
     /// Purpose of the schedule.
     pub description: String,
 }
 
 impl Inner {
-    /// The available schedules: that of the demonstration, those of this session, and the manoeuvres of the list.
+    /// The available schedules: the default of `greylag demo`, those of this session, and the standard manoeuvres.
     pub fn schedules(&self) -> Vec<Choice> {
         let attitudes = Choice {
             id: ATTITUDES.into(),
@@ -69,7 +71,8 @@ impl Inner {
         std::iter::once(attitudes).chain(own).chain(of_menu).collect()
     }
 
-    /// Path of the model for a flight: the amended model if its fit is complete and an effect joined, otherwise the given model.
+    /// Path of the model for a flight. It is the amended model if the fit with the accepted effects is complete and has added an
+    /// effect, otherwise the session's given model.
     pub fn flying_model(&self) -> PathBuf {
         let key = self.key("fit", &self.session.effects);
         let fitted = self.fits.get(&key).filter(|f| !f.all_refused());
@@ -82,7 +85,7 @@ impl Inner {
     }
 }
 
-/// Names of the controllers that need no trained policy.
+/// Names of the controllers that need no trained policy (neural network).
 pub fn controllers() -> impl Iterator<Item = &'static str> {
     let alone = ControllerKind::ALL.iter().filter(|k| !k.needs().policy());
     alone.map(|k| k.name())
@@ -131,7 +134,8 @@ impl Order {
         Ok(words)
     }
 
-    /// Path of the schedule file; `None` for the default schedule of the demonstration.
+    /// Path of the schedule's file; `None` for the default schedule of `greylag demo`. The file of a standard manoeuvre is
+    /// written.
     fn schedule(&self, folder: &Path, cruise_mps: f64) -> Result<Option<PathBuf>, WorkbenchError> {
         if self.schedule == ATTITUDES {
             return Ok(None);
@@ -152,7 +156,7 @@ impl Order {
     }
 }
 
-/// The command with its arguments, quoted for a shell.
+/// The command `greylag` with the arguments `words`, quoted for a shell.
 pub fn line(words: &[String]) -> String {
     words.iter().fold("greylag".into(), |line, word| line + " " + &quoted(Path::new(word)))
 }

@@ -1,4 +1,4 @@
-//! Handlers of the HTTP routes.
+//! Handlers of the HTTP requests that the workbench's page makes.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use crate::bench::Bench;
 use crate::error::{Kind, WorkbenchError};
 use crate::view::RunRequest;
 
-/// An answer with an error message as JSON.
+/// A response with this status and the error message `why` as JSON.
 pub fn failure(status: StatusCode, why: &str) -> Response {
     (status, Json(json!({ "error": why }))).into_response()
 }
@@ -39,7 +39,7 @@ impl IntoResponse for WorkbenchError {
     }
 }
 
-/// Runs `work` on a separate thread, because other requests must be answered meanwhile.
+/// Runs `work` on a separate thread, so that other requests are answered meanwhile. Responds with its result or error as JSON.
 async fn aside<T: Serialize + Send + 'static>(
     shared: Shared,
     work: impl FnOnce(&Arc<Bench>) -> Result<T, WorkbenchError> + Send + 'static,
@@ -54,27 +54,27 @@ async fn aside<T: Serialize + Send + 'static>(
     }
 }
 
-/// The state of the session as JSON, without curves.
+/// Responds with the state of the session as JSON, without the data of curves.
 pub async fn state(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| bench.state()).await
 }
 
-/// Errors of the models by channel and regime, as JSON.
+/// Responds with the errors of the models by channel (force or moment) and flight condition, as JSON.
 pub async fn failing(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| bench.failing()).await
 }
 
-/// The diagnosis as JSON; `null` without one.
+/// Responds with the diagnosis as JSON; `null` if there is none.
 pub async fn diagnosis(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| Ok(bench.diagnosis())).await
 }
 
-/// Result of the search for a formula, as JSON; `null` without a search.
+/// Responds with the result of the search for a formula, as JSON; `null` if there is none.
 pub async fn proposal(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| Ok(bench.proposal())).await
 }
 
-/// Names that an effect file may use, as JSON.
+/// Responds with the names that the formula in an effect file may use, as JSON.
 pub async fn grammar() -> Response {
     Json(crate::grammar()).into_response()
 }
@@ -86,36 +86,36 @@ pub struct Text {
     text: String,
 }
 
-/// Description of an effect file or its error, as JSON.
+/// Checks the text of an effect file. Responds with a description of the effect, or with the error, as JSON.
 pub async fn check(Json(Text { text }): Json<Text>) -> Response {
     match crate::check(&text) {
         Ok(checked) => Json(checked).into_response(),
-        // a text that the user still edits is not an error of the request
+        // the user may still be editing the text, so that an error in it is no error of the request
         Err(error) => Json(json!({ "error": error.to_string() })).into_response(),
     }
 }
 
-/// The curve of an accepted effect, as JSON.
+/// Responds with the curve of the accepted effect `effect`, as JSON.
 pub async fn curve(State(shared): State<Shared>, Path(effect): Path<String>) -> Response {
     aside(shared, move |bench| bench.curve(&effect)).await
 }
 
-/// The present flight, or else the last flight, as JSON; `null` without a flight.
+/// Responds with the present simulated flight, or with the last one if none is in progress, as JSON; `null` without a flight.
 pub async fn flying(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| Ok(bench.flying())).await
 }
 
-/// One flight over time, as JSON.
+/// Responds with the time series of the flight with index `place`, as JSON.
 pub async fn flight(State(shared): State<Shared>, Path(place): Path<usize>) -> Response {
     aside(shared, move |bench| bench.flight(place)).await
 }
 
-/// Free runs from a time of a flight, as JSON.
+/// Responds with free runs (open-loop simulations) of the models from a time of a flight, as JSON.
 pub async fn free_run(State(shared): State<Shared>, Json(request): Json<RunRequest>) -> Response {
     aside(shared, move |bench| bench.free_run(request)).await
 }
 
-/// Executes a request and answers with the new state of the session.
+/// Executes a request of the page and responds with the new state of the session.
 pub async fn act(State(shared): State<Shared>, Json(request): Json<Request>) -> Response {
     aside(shared, move |bench| {
         bench.act(request)?;
@@ -124,14 +124,14 @@ pub async fn act(State(shared): State<Shared>, Json(request): Json<Request>) -> 
     .await
 }
 
-/// Query of an upload: name of the log, and revision on which the upload is based.
+/// Query of an upload: the name of the log, and the revision of the session that the page showed.
 #[derive(Deserialize)]
 pub struct Sent {
     name: String,
     revision: u64,
 }
 
-/// Adds an uploaded log and answers with the new state of the session.
+/// Adds an uploaded log to the session and responds with the session's new state.
 pub async fn take(
     State(shared): State<Shared>,
     Query(sent): Query<Sent>,
@@ -139,7 +139,7 @@ pub async fn take(
     body: Body,
 ) -> Response {
     let announced = headers.get(CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse().ok());
-    // a log with a too large declared length is refused before its body is read
+    // if the declared length is too large, the log is refused before its content is read
     if announced.is_some_and(|bytes: usize| bytes > LARGEST_LOG) {
         return too_large(&sent.name);
     }
@@ -159,26 +159,26 @@ fn too_large(name: &str) -> Response {
     failure(StatusCode::PAYLOAD_TOO_LARGE, &why)
 }
 
-/// An event after which a page reads the state again; without a revision, it does so in any case.
+/// An event that makes an open page read the state again. `revision` is the present revision of the session; `None` if unknown.
 fn changed(revision: Option<u64>) -> Arc<str> {
     json!({ "event": "changed", "revision": revision }).to_string().into()
 }
 
-/// Stream of events for an open page.
+/// Responds with a stream of events for an open page. The first event has the present revision of the session.
 pub async fn events(
     State(shared): State<Shared>,
 ) -> Sse<impl Stream<Item = Result<sse::Event, Infallible>>> {
     let later = BroadcastStream::new(shared.events.subscribe());
-    // another request may hold the lock of the session; this thread must not block meanwhile
+    // another request may hold the lock of the session, and this thread must not block meanwhile
     let revision = tokio::task::spawn_blocking(move || shared.bench.revision()).await;
     let first = tokio_stream::once(changed(revision.ok()));
-    // a page that lags may have missed a change
+    // if the stream is read too slowly, events are lost, and the page is told to read the state again
     let later = later.map(|event| event.unwrap_or_else(|_| changed(None)));
     let all = first.chain(later).map(|text: Arc<str>| Ok(sse::Event::default().data(&*text)));
     Sse::new(all).keep_alive(KeepAlive::default())
 }
 
-/// Answer to a request for an unknown address.
+/// Responds to a request for an unknown address.
 pub async fn nothing() -> Response {
     let body: Value = json!({ "error": "there is nothing of that name" });
     (StatusCode::NOT_FOUND, Json(body)).into_response()

@@ -55,8 +55,8 @@ pub(super) struct Engagement {
     refused: Option<u8>,
     /// Whether a mode request was accepted in this engagement.
     accepted: bool,
-    /// Whether engagement is blocked. It is blocked from the loss or return of control authority until the companion is not
-    /// armed for at least one tick.
+    /// Whether engagement is blocked. The loss or return of control authority blocks it until [`rest`](Engagement::rest) is
+    /// called.
     barred: bool,
     /// Whether it was reported that the return is not confirmed.
     reminded: bool,
@@ -94,8 +94,8 @@ impl Engagement {
         begins
     }
 
-    /// To be called if the companion does not demand control authority. Ends the block, and begins the return of control
-    /// authority if the companion has or requests it.
+    /// To be called if the companion does not demand control authority. Ends the blocking of engagement. Begins the return of
+    /// control authority if the companion has or requests it.
     pub(super) fn rest(&mut self) {
         self.barred = false;
         if self.steers() {

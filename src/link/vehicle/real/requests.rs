@@ -59,7 +59,7 @@ impl Requests {
         self.denied.contains(&id)
     }
 
-    /// The text of [`words`](Requests::words), but only once; `None` afterwards.
+    /// The text of [`words`](Requests::words) when it is called first with such a text; `None` afterwards.
     pub(super) fn complaint(&mut self, stack: Stack) -> Option<String> {
         let words = self.words(stack).filter(|_| !self.reported)?;
         self.reported = true;

@@ -107,7 +107,8 @@ pub struct Candidate {
     pub selected_in_bootstraps: f64,
     /// Estimate of the first parameter from each flight alone.
     pub by_flight: Vec<FlightEstimate>,
-    /// Smallest value of the first parameter that these flights would have shown, in its unit; `None` if there is no such value.
+    /// Smallest value of the first parameter, in its unit, at which these flights would have shown the effect; `None` if there
+    /// is no such value.
     pub minimum_detectable: Option<f64>,
     /// Reasons not to assert the effect although its evidence exceeds the critical value.
     pub refused: Vec<String>,

@@ -14,7 +14,8 @@ use crate::diagnose::regression::whiten::Whitener;
 const ORDER: usize = 8;
 /// Ridge parameter of the regression, as a fraction of a column's squared norm.
 const RIDGE: f64 = 1e-4;
-/// Number of whitening filters that are fitted one after the other, each to the residual of a regression with the filter before.
+/// Number of whitening filters that are fitted one after the other, each to the residual of a regression with the previous
+/// filter.
 const PASSES: usize = 2;
 
 /// Noise of every channel.

@@ -33,8 +33,8 @@ pub const CLOSE: f64 = 10.0;
 const UNSURE: f64 = 0.1;
 /// A residual sum of squares is significant if it exceeds its expectation for pure noise by this number of standard deviations.
 const DOUBT: f64 = 4.0;
-/// Of a flight's information on a coefficient, a part is due to noise in the regressors. If the share of the rest is not above
-/// this value, the flight yields no estimate.
+/// Part of a flight's information on a coefficient is due to noise in the regressors. The flight yields an estimate only if the
+/// rest exceeds this share of the information.
 const LEAST_SIGNAL: f64 = 0.5;
 /// First condition for a candidate that merely undoes changes of existing coefficients. The fit changes these coefficients from
 /// their prior means. The candidate reduces the sum of the squares of these changes, in prior standard deviations, by more than
@@ -170,8 +170,8 @@ pub fn class(round: &Round, scores: &[(usize, Score)], of: usize) -> Vec<usize> 
         .collect()
 }
 
-/// Share of `count` block bootstraps in which one of the candidates `class` ranks first. The best of the candidates `open`
-/// compete; the best candidate is first in `open`. Blocks are drawn separately for each flight.
+/// Share of `count` block bootstraps in which one of the candidates `class` ranks first. The candidates are listed in `open`,
+/// the best first, and the first `COMPETING` of them compete. Blocks are drawn separately for each flight.
 pub fn selected(round: &Round, open: &[usize], class: &[usize], count: usize) -> f64 {
     let seed = round.seed;
     let by_flight: Vec<Vec<usize>> = (0..round.flights.len())

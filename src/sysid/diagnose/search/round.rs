@@ -1,5 +1,10 @@
-//! A round of the search: the model, linearised over all flights, with the regressors (columns) of all candidate
-//! effects.
+//! A round of the search for missing effects: the model, linearised over all flights, and the regressors (columns) of the
+//! candidates (effects that the model may lack).
+//!
+//! A column has one row for each window (a short stretch of flight) and channel (a force or moment). Nuisance parameters are
+//! estimated but are not of interest: coefficients of the model, constants of a flight, sensor errors. Their columns are
+//! projected out of the residual (measured minus predicted value) and of the candidates' columns. Nonlinear candidates are
+//! linearised at several points, which are sets of values of their coefficients.
 
 mod known;
 mod shared_noise;
@@ -20,30 +25,29 @@ use greylag_model::GreyBox;
 use known::{curved, known};
 use shared_noise::{Setting, shared, sum};
 
-/// Largest number of times a nonlinear candidate is linearised again at its best fit.
+/// Largest number of times that nonlinear candidates are linearised again at their best fits.
 const REFINEMENTS: usize = 3;
-/// Number of iterations of the second-order correction for the delay of the actuator record.
+/// Number of iterations of the second-order correction for the delay of the recorded actuators.
 const CURVATURES: usize = 2;
-/// A nonlinear candidate is linearised again if its reduction of the residual sum of squares exceeds this share of the
-/// largest reduction.
+/// A nonlinear candidate is linearised again if its reduction of the residual sum of squares exceeds this share of the largest
+/// reduction by any candidate.
 const WORTH: f64 = 0.2;
-/// A nonlinear candidate is also linearised again if its evidence is less than this amount below that of the best
-/// candidate.
+/// A nonlinear candidate is also linearised again if its evidence is less than this amount below that of the best candidate.
 const CLOSE: f64 = 40.0;
-/// A candidate counts as linearised near zero if the estimates of its linear coefficients exceed their values at the
-/// point of linearisation by this factor.
+/// A candidate counts as linearised near zero if the estimate of each linear coefficient is more than this number of times the
+/// value at the point of linearisation.
 const NOTHING: f64 = 1e3;
 
 /// Data common to all rounds of a search.
 #[derive(Clone)]
 pub struct Problem {
-    /// The flights, resampled to a multiple of the model step.
+    /// The flights, resampled to a multiple of the model's time step.
     pub flights: Vec<Prepared>,
     /// Prior mean and standard deviation of each coefficient of the model as given, in the order of the coefficients.
     pub prior: Vec<(f64, f64)>,
-    /// Errors of the reconstructed airspeed, α and β, by flight.
+    /// For each flight, the errors of the reconstructed airspeed, α and β.
     pub path: Vec<shared::PathError>,
-    /// Prior standard deviations of the sensor errors, by flight.
+    /// For each flight, the prior standard deviations of the sensor errors.
     pub sensors: Vec<[f64; SENSORS]>,
     /// Constants that are estimated for each flight in addition to the sensor errors.
     pub per_flight: PerFlight,
@@ -54,10 +58,9 @@ pub struct Problem {
 /// Results of other rounds that a round may use.
 #[derive(Clone, Copy, Default)]
 pub struct Beside<'a> {
-    /// Noise of the channels. If `None`, the round estimates it.
+    /// Noise of the channels; `None` to estimate it.
     pub noise: Option<&'a Noise>,
-    /// Model whose predicted accelerations enter the regressors of mass and inertia. If `None`, the round's own model
-    /// predicts them.
+    /// Model that predicts the accelerations in the regressors of mass and inertia; `None` for the round's own model.
     pub accelerating: Option<&'a GreyBox>,
 }
 
@@ -65,23 +68,23 @@ pub struct Beside<'a> {
 pub struct Round {
     /// The model that is linearised.
     pub model: GreyBox,
-    /// The flights with residuals and regressors of the sensor errors under this model.
+    /// The flights, with the residuals of this model and the regressors of the sensor errors.
     pub flights: Vec<Ready>,
-    /// Division of the windows into cells: one for each channel of each flight.
+    /// Division of the windows into cells: one cell for each channel of each flight.
     pub cells: Cells,
-    /// Nuisance parameters in this order: free coefficients of the model, constants of all flights, sensor errors of
-    /// all flights.
+    /// Nuisance parameters in this order: free coefficients of the model, constants of all flights, sensor errors of all
+    /// flights.
     pub known: Vec<Known>,
     /// Index of each free coefficient among all coefficients of the model.
     pub coefficients: Vec<usize>,
-    /// Selection of the constants that are estimated for each flight.
+    /// Constants that are estimated for each flight in addition to the sensor errors.
     pub per_flight: PerFlight,
     /// The candidate effects, with the indices of their regressors.
     pub trials: Vec<Trial>,
     /// Gram matrices of the candidates' columns and the residual, with the nuisance parameters projected out.
     pub projected: Projected,
-    /// Columns by flight: regressors of the nuisance parameters, regressors of the candidates, residual, features of
-    /// the flexible model.
+    /// For each flight, the columns in this order: nuisance parameters, candidates, residual, features of the flexible model (a
+    /// regression without physics).
     pub placed: Vec<Placed>,
     /// Index of the residual among the columns in `placed`.
     pub last: usize,
@@ -94,11 +97,11 @@ pub struct Round {
     /// Descriptions of the candidates.
     pub entries: Vec<Entry>,
     refined: Vec<(&'static str, Vec<f64>)>,
-    /// Bias of the products of columns and residual, by flight and index of the column. It is due to noise that both
+    /// For each flight and column, the bias of the scalar product of the column and the residual. It is due to noise that both
     /// have in common (errors in variables).
     pub shared: Vec<Vec<f64>>,
-    /// Columns of the nuisance parameters and linear candidates after simulated noise has been added to the flights.
-    /// The indices are those of `placed`.
+    /// Columns of the nuisance parameters and of linear candidates after simulated noise was added to the flights. The indices
+    /// are those of `placed`.
     pub disturbed: Vec<Placed>,
 }
 
@@ -166,8 +169,8 @@ impl Round {
         })
     }
 
-    /// Returns the indices and scores of all candidates, the best first. Nonlinear candidates near the top are
-    /// linearised again at their best fit.
+    /// Returns the indices and scores of all candidates, the best first. Nonlinear candidates that rank high are linearised again
+    /// at their best fit.
     pub fn rank(&mut self) -> Vec<(usize, Score)> {
         let mut scores = self.scores();
         for _ in 0..REFINEMENTS {
@@ -194,9 +197,9 @@ impl Round {
         scores
     }
 
-    /// Next point of linearisation of a candidate: its estimated coefficients. A candidate that was linearised near
-    /// zero keeps its shape constants (nonlinear coefficients), because the derivatives with respect to them vanish
-    /// there.
+    /// Next point of linearisation of the candidate `trial`: its estimated coefficients. A candidate that was linearised near
+    /// zero keeps its shape constants (coefficients in which it is nonlinear), because the derivatives with respect to them
+    /// vanish there.
     fn next_place(&self, trial: &Trial, score: &Score) -> Vec<f64> {
         let start = &trial.points[score.point].values;
         let mut next = score.values.clone();
@@ -209,7 +212,8 @@ impl Round {
         next
     }
 
-    /// Adds points of linearisation. Returns `false` if the regressors with these points cannot be used.
+    /// Adds the points of linearisation `wanted`, each with the id of its candidate. Returns `false` if the regressors with these
+    /// points cannot be used.
     fn refine(&mut self, wanted: Vec<(&'static str, Vec<f64>)>) -> bool {
         self.refined.extend(wanted);
         let made = catalogue::columns(&self.model, &self.flights, &self.entries, &self.refined);
@@ -231,8 +235,8 @@ impl Round {
         true
     }
 
-    /// Bias of the products of columns and residual due to common noise, summed over all flights, by index of the
-    /// column.
+    /// For each column, the bias of the scalar product of the column and the residual due to common noise, summed over all
+    /// flights.
     pub fn shared(&self) -> Vec<f64> {
         sum(&self.shared)
     }
@@ -266,8 +270,8 @@ impl Round {
     }
 
     /// Wald statistic of the added effect `id` for the hypothesis that all its free coefficients are zero. `None` if no
-    /// coefficient is free. `None` also if the effect is nonlinear in a coefficient and does not act on the inputs:
-    /// zero coefficients then do not mean that the effect is absent.
+    /// coefficient is free. `None` also if the effect is nonlinear in a coefficient and is no input effect, because zero
+    /// coefficients then do not mean that it is absent.
     pub fn amount(&self, id: &str) -> Option<f64> {
         let prefix = format!("{id}.");
         let operator = greylag_physics::inputs::Kind::from_id(id).is_some();
@@ -288,12 +292,12 @@ impl Round {
     }
 }
 
-/// Columns of `list` up to and including the index `place`.
+/// The columns of `list` up to and including the index `place`.
 fn up_to(list: &Placed, place: usize) -> Placed {
     list.iter().take_while(|(p, _)| *p <= place).cloned().collect()
 }
 
-/// Appends the candidates' columns and the residual to the columns of the `count` nuisance parameters. Returns the
+/// Appends the candidates' columns and the residual to `placed`, the columns of the `count` nuisance parameters. Returns the
 /// index of the residual.
 fn place(placed: &mut [Placed], count: usize, made: &Columns, flights: &[Ready]) -> usize {
     let last = count + made.columns.first().map_or(0, Vec::len);
@@ -304,7 +308,7 @@ fn place(placed: &mut [Placed], count: usize, made: &Columns, flights: &[Ready])
     last
 }
 
-/// Columns for the estimate of the noise: all except the derivatives of nonlinear candidates.
+/// The columns from which the noise is estimated: all of `placed` except the derivatives of nonlinear candidates.
 fn rich(placed: &[Placed], count: usize, trials: &[Trial]) -> Vec<Placed> {
     let curved = trials.iter().flat_map(|t| &t.points).filter(|p| p.contribution.is_some());
     let left_out: Vec<usize> = curved.flat_map(|p| p.free.iter().map(|f| count + f.1)).collect();

@@ -1,9 +1,10 @@
-//! Tests of the elimination and the solution against dense matrices.
+//! Tests of the solver for the smoother's normal equations, which are block-tridiagonal in time and bordered by constants.
 
 use super::*;
 use nalgebra::{DMatrix, DVector};
 
-/// Equations from given links, with unit prior information on every unknown of an instant.
+/// Equations from given links (equations that couple two successive instants), with unit prior information on every unknown of
+/// an instant.
 struct Given<const N: usize, const W: usize> {
     links: Vec<Link<N, W>>,
 }
@@ -20,7 +21,8 @@ impl<const N: usize, const W: usize> Equations<N, W> for Given<N, W> {
     }
 }
 
-/// A repeated elimination of the instants gives the same solution to the last bit.
+/// If only some of the eliminated instants are kept, and the others are eliminated again for the back substitution, the solution
+/// is the same to the bit.
 #[test]
 fn parts_equal_the_whole() {
     let mut seed = 1_u64;
@@ -54,14 +56,14 @@ fn parts_equal_the_whole() {
     assert!(none.substitute(&equations, &by).is_none());
 }
 
-/// The band solution equals a dense solution of the same system.
+/// The solution equals that of the same equations as a dense matrix.
 #[test]
 fn band_equals_dense() {
     const N: usize = 6;
     const C: usize = 5;
     const COUNT: usize = 7;
     let size = COUNT * N + C;
-    // residuals with pseudo-random coefficients; each depends on two adjacent instants and on the constants
+    // each residual depends on two successive instants and on the constants, with pseudo-random coefficients
     let mut seed = 1_u64;
     let mut random = || {
         seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -116,7 +118,7 @@ fn band_equals_dense() {
         }
     }
     assert!((p.clone() - reference.rows(COUNT * N, C)).norm() < 1e-11);
-    // the least sum of squares is Σ r² less its reduction by the dense solution
+    // the smallest sum of squares is the sum at zero unknowns minus its reduction by the dense solution
     let least = left.corner[C][C] - b.dot(&p);
     assert!((least - (corner[C][C] - right.dot(&reference))).abs() < 1e-11);
     let log_det = left.log_det + factor.determinant().ln();

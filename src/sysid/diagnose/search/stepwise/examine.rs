@@ -1,4 +1,6 @@
-//! Checks of the best candidate before it is added to the model.
+//! Checks of the best candidate (an effect that the model may lack) before it is added to the model. The evidence is the test
+//! statistic by which candidates are ranked. The residual beyond noise is the residual sum of squares minus its expectation for
+//! pure noise. A block is a stretch of about 4 s of a flight.
 
 use super::found::{Found, Selected};
 use crate::diagnose::options::Options;
@@ -7,23 +9,22 @@ use crate::diagnose::search::checks;
 use crate::diagnose::search::round::Round;
 use crate::diagnose::search::unexplained::explained;
 
-/// Smallest share of the residual beyond noise that an effect must remove from held-out blocks.
+/// The effect must remove at least this share of the residual beyond noise in held-out blocks.
 pub const HELD_OUT: f64 = 0.1;
-/// Smallest share of block bootstraps in which the effect, or an effect that is indistinguishable from it, must rank
-/// first.
+/// The effect, or one that the flights cannot distinguish from it, must rank first in at least this share of block bootstraps.
 pub const SELECTED: f64 = 0.8;
-/// Relative precision of the formula of a nonlinear effect. An effect selected later may merely correct the error of
-/// this formula if its reduction of the residual is below this share of the nonlinear effect's reduction.
+/// Relative precision of the formula of a nonlinear effect. A later effect may merely correct the error of this formula if it
+/// reduces the residual by less than this share of the nonlinear effect's reduction.
 const PRECISION: f64 = 2e-3;
-/// Smallest share of a channel's variance that an effect must explain to be asserted. A delay of 10 ms explains 2e-4.
+/// To be asserted, an effect must explain at least this share of the variance of a channel (a force or moment). For comparison, a
+/// delay of 10 ms explains 2e-4.
 const MATERIAL: f64 = 1e-4;
-/// Smallest share of a channel's residual beyond noise that an effect must remove to be asserted.
+/// To be asserted, an effect must remove at least this share of the residual beyond noise in the same channel.
 const MATERIAL_BESIDE: f64 = 0.02;
-/// Two candidates can replace each other if the correlation of their contributions exceeds this magnitude.
+/// Two candidates compete if the magnitude of the correlation of their contributions exceeds this value.
 const RIVAL: f64 = 0.3;
 
-/// Returns the best candidate with the results of all checks. `None` if its evidence does not exceed the critical
-/// value.
+/// The best candidate with the results of all checks. `None` if its evidence does not exceed the critical value.
 pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
     let round = found.round();
     let (place, score) = found.scores.first()?;
@@ -44,7 +45,7 @@ pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
     if slight {
         refused.push(under("it takes", heldout, "of the error on held-out segments", HELD_OUT));
     }
-    // an uncorrelated candidate explains another part of the residual, so it does not compete with the best candidate
+    // a candidate that is not correlated with the best one explains another part of the residual and does not compete with it
     let rival = |(t, other): &&(usize, Score)| {
         !found.beaten.contains(t) && checks::correlation(round, score, other).abs() > RIVAL
     };
@@ -53,7 +54,7 @@ pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
     if selected < SELECTED && options.bootstraps > 0 {
         refused.push(under("it is the best in", selected, "of the block bootstraps", SELECTED));
     }
-    // a candidate that merely replaces changes of coefficients does not correct the error of a formula
+    // a candidate that merely undoes changes of coefficients does not correct the error of a formula
     refused.extend(hidden(found, score).filter(|_| !absorbs_prior_error));
     let by_flight = checks::by_flight(round, trial, score);
     let (first, of_first) = &by_flight[0];
@@ -85,23 +86,22 @@ pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
     })
 }
 
-/// Indices in the ranking of the candidates that the data cannot distinguish from the best candidate.
+/// Indices in the ranking of the candidates that the flights cannot distinguish from the best candidate.
 fn class(found: &Found) -> Vec<usize> {
     let mut class = checks::class(found.round(), &found.scores, 0);
     class.retain(|k| !found.beaten.contains(&found.scores[*k].0));
-    // the class also contains the candidates that fitted equally well when they were added to the model
+    // candidates that fitted equally well after they had been added to the model belong to the class too
     let level = (1..found.scores.len()).filter(|k| found.level.contains(&found.scores[*k].0));
     let level: Vec<usize> = level.filter(|k| !class.contains(k)).collect();
     class.extend(level);
     class
 }
 
-/// Returns a remark if a significant effect is too small to be asserted: no channel reaches both [`MATERIAL`] and
-/// [`MATERIAL_BESIDE`].
+/// A remark if a significant effect is too small to be asserted: in no channel does it reach both [`MATERIAL`] and
+/// [`MATERIAL_BESIDE`]. Otherwise `None`.
 ///
-/// The reduction of the residual is computed from a joint estimate of the effect and all coefficients. The evidence
-/// would be too large a measure: it also counts deviations from the prior and noise in the regressors, which no channel
-/// shows.
+/// The reduction of the residual is computed from a joint estimate of the effect and all coefficients. The evidence would
+/// overstate the effect, because it also contains deviations from the prior and noise in the regressors.
 fn immaterial(found: &Found, round: &Round, score: &Score) -> Option<String> {
     let taken = round.taken_by(score);
     let explained = explained(&found.first, &round.tuned_residual(), &round.residual_with(score));
@@ -127,7 +127,7 @@ fn immaterial(found: &Found, round: &Round, score: &Score) -> Option<String> {
     })
 }
 
-/// Text of a refusal. The share is below the limit `least` or, if it is NaN, cannot be computed.
+/// Text of an objection: `share` is below the limit `least`, or it is NaN because it cannot be computed.
 fn under(verb: &str, share: f64, of: &str, least: f64) -> String {
     match share.is_nan() {
         true => format!("the share that {verb} {of} cannot be computed"),
@@ -135,8 +135,8 @@ fn under(verb: &str, share: f64, of: &str, least: f64) -> String {
     }
 }
 
-/// Returns the reason for a refusal if the effect of `score` may merely correct the formula of an effect selected
-/// earlier.
+/// An objection if the effect with this `score` may merely correct the formula of an effect that was selected earlier; otherwise
+/// `None`.
 fn hidden(found: &Found, score: &Score) -> Option<String> {
     let earlier = found.selected.iter().find(|s| s.curved && hides(s, score))?;
     Some(format!(
@@ -146,7 +146,7 @@ fn hidden(found: &Found, score: &Score) -> Option<String> {
     ))
 }
 
-/// Whether the effect of `score` may merely correct the formula of the effect `earlier`.
+/// Whether the effect with this `score` may merely correct the formula of the effect `earlier`.
 fn hides(earlier: &Selected, score: &Score) -> bool {
     score.fall < PRECISION * earlier.score.fall
 }
