@@ -14,7 +14,8 @@ use greylag::sysid::flight_path::reconstruction::Reconstruction;
 
 use crate::aircraft::{self, Aircraft, numbered, pieces, seconds};
 use crate::{
-    CHOSEN_ARX, CORRECTED, Errors, HOLD, HORIZONS_S, LEAST_SQUARES, WAYS, judged, print_errors,
+    CHOSEN_ARX, Corrections, Errors, FITTED, HOLD, HORIZONS_S, LEAST_SQUARES, WAYS, judged,
+    print_errors,
 };
 
 /// Places in [`WAYS`] of what the fitted model is compared with: least squares, hold, straight on, and ARX of a chosen order.
@@ -49,7 +50,7 @@ struct Point {
     durations_s: Vec<f64>,
 }
 
-/// Ratio of the error of the fitted model, with its correction, to that of its best rival.
+/// Ratio of the error of the fitted model to that of its best rival.
 struct Ratio {
     /// The ratio of the mean errors over the flights held out, dimensionless.
     value: f64,
@@ -67,7 +68,7 @@ pub fn print() -> Result<()> {
         "Learning curve: scaled error of free runs on flights held out, all choices and fits by a share of the training data.\n\
          Errors are averaged over the training sets of a share, then over the flights held out; ± is the standard error over the \
          latter.\n\
-         The ratio is that of the error of the fitted, corrected model to the lowest error of the others: least squares, hold the state, straight \
+         The ratio is that of the error of the fitted model to the lowest error of the others: least squares, hold the state, straight \
          on, ARX of a chosen order."
     );
     for aircraft in aircraft::all()? {
@@ -109,7 +110,7 @@ fn point(aircraft: &Aircraft, share: &Share) -> Result<Point> {
                 k + 1,
                 sets.len()
             );
-            let judged = judged(&aircraft.model, set, &test)?;
+            let judged = judged(&aircraft.model, set, &test, Corrections::Skipped)?;
             for what in [judged.structure, judged.arx] {
                 *point.chosen.entry(what).or_insert(0) += 1;
             }
@@ -156,15 +157,15 @@ fn print_ratios(point: &Point) {
 /// The best rival is the one with the lowest mean over the flights held out. It is chosen after the fact, in favour of the
 /// rivals.
 fn ratio(errors: &[Errors], horizon: usize) -> Option<Ratio> {
-    let known: Vec<&Errors> = errors.iter().filter(|e| e[CORRECTED][horizon].is_finite()).collect();
+    let known: Vec<&Errors> = errors.iter().filter(|e| e[FITTED][horizon].is_finite()).collect();
     let n = known.len() as f64;
     let mean = |way: usize| known.iter().map(|e| e[way][horizon]).sum::<f64>() / n;
     // the mean of a rival that is missing for one of the flights is NaN
     let rivals = RIVALS.into_iter().filter(|way| mean(*way).is_finite());
     let best = rivals.min_by(|a, b| mean(*a).total_cmp(&mean(*b)))?;
-    let value = mean(CORRECTED) / mean(best);
+    let value = mean(FITTED) / mean(best);
     // to first order, the error of a ratio of two means is that of the mean of these differences, relative to the denominator
-    let left = |e: &&Errors| e[CORRECTED][horizon] - value * e[best][horizon];
+    let left = |e: &&Errors| e[FITTED][horizon] - value * e[best][horizon];
     let spread = known.iter().map(|e| left(e).powi(2)).sum::<f64>() / (n - 1.0);
     let error = (spread / n).sqrt() / mean(best);
     Some(Ratio { value, error, flights: known.len(), best })

@@ -90,7 +90,7 @@ fn table() -> Result<()> {
         let mut all = Vec::new();
         for left in 0..aircraft.flights.len() {
             let (fit, test) = aircraft.held_out(left);
-            let judged = judged(&aircraft.model, &fit, &test)?;
+            let judged = judged(&aircraft.model, &fit, &test, Corrections::Tried)?;
             println!("  held out {}: {}; {}", test.name, judged.structure, judged.arx);
             all.push(judged.errors);
         }
@@ -126,8 +126,20 @@ fn cell(errors: &[f64]) -> String {
     }
 }
 
+/// Whether corrections of the fitted model's free runs are tried. This takes longer than all fits.
+#[derive(Clone, Copy, PartialEq)]
+enum Corrections {
+    Tried,
+    Skipped,
+}
+
 /// Errors on the flight `test` of all ways, made of the flights `fit` alone, and what was chosen.
-fn judged(model: &GreyBox, fit: &[Reconstruction], test: &Reconstruction) -> Result<Judged> {
+fn judged(
+    model: &GreyBox,
+    fit: &[Reconstruction],
+    test: &Reconstruction,
+    corrections: Corrections,
+) -> Result<Judged> {
     let test = std::slice::from_ref(test);
     let slowest = model.airframe.envelope.flying_from_mps();
     let ready = |all: &[Reconstruction]| {
@@ -142,9 +154,11 @@ fn judged(model: &GreyBox, fit: &[Reconstruction], test: &Reconstruction) -> Res
     {
         errors[place] = scaled(&scores(model, test, &HORIZONS_S)?);
     }
-    let correction = corrected::chosen(&parts, |others| tuned(model, others, structure))?;
-    errors[CORRECTED] = corrected::errors(&fitted, fit, test, correction)?;
-    named = format!("{named}, {}", correction.in_words());
+    if corrections == Corrections::Tried {
+        let correction = corrected::chosen(&parts, |others| tuned(model, others, structure))?;
+        errors[CORRECTED] = corrected::errors(&fitted, fit, test, correction)?;
+        named = format!("{named}, {}", correction.in_words());
+    }
     let forecasts = forecast::on_unseen(&seen, &unseen, model.scale(), &HORIZONS_S);
     for (row, forecast) in errors[HOLD..].iter_mut().zip(forecasts) {
         *row = scaled(&forecast.free_run);

@@ -12,7 +12,7 @@ use greylag::sim::missing::Missing;
 use greylag::sysid::amend;
 use greylag::sysid::diagnose::{Detail, Diagnosis, Options, Verdict, diagnose};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
-use greylag::sysid::per_flight::PerFlight;
+use greylag::sysid::per_flight::{PerFlight, SensorErrors};
 use greylag::sysid::progress::ignore_progress;
 use greylag_sitl::hidden::Hidden;
 use nalgebra::{Rotation3, Vector3};
@@ -128,6 +128,43 @@ fn trims_of_flights_are_found_beside_the_model() {
     assert!(without.doubtful.iter().any(|s| s.contains("Cmq")), "{:?}", without.doubtful);
     assert_eq!(found.verdict, Verdict::Adequate);
     assert!(found.sentences.iter().any(|s| s.contains("its trim differs") && s.contains("Cm0")));
+}
+
+/// A flight whose airspeed reads 5 % high and whose vane reads 0.03 rad high, as a reconstruction without other sensors leaves it.
+fn misread(seed: u64) -> Reconstruction {
+    let mut flight = flight([0.0; 2], [0.0; 3], seed);
+    for at in flight.segments.iter_mut().flat_map(|s| &mut s.instants) {
+        at.state.airspeed *= 1.05;
+        at.state.alpha += 0.03;
+    }
+    for nuisance in &mut flight.nuisances {
+        match nuisance.name.as_str() {
+            "airspeed_scale" => nuisance.sd = 0.05,
+            "alpha_bias" => nuisance.sd = 0.03,
+            _ => {}
+        }
+    }
+    flight
+}
+
+#[test]
+fn sensor_errors_that_flights_share_correct_a_flight_that_the_fit_has_not_seen() {
+    let flights = [31, 32, 33].map(misread);
+    let fitted = |sensors: SensorErrors| {
+        let per_flight = PerFlight { sensors, ..PerFlight::default() };
+        let options = amend::Options { per_flight, ..amend::Options::default() };
+        let model = sensors::model();
+        amend::amend(&model, &flights[..2], &flights[2..], &options, &ignore_progress).unwrap()
+    };
+    let [judged, dropped] = [SensorErrors::Judged, SensorErrors::Dropped].map(fitted);
+    let error = |of: &amend::Amended| of.amendment.after[2].rmse_scaled;
+    println!("{} {} {:?}", error(&judged), error(&dropped), judged.model.known.installation);
+    println!("{:#?}", judged.amendment.notes);
+    assert!(error(&judged) < 0.8 * error(&dropped));
+    let shared = judged.model.known.installation.as_ref().and_then(|all| all.sensors).unwrap();
+    assert!((shared[0] - 0.05).abs() < 0.02 && (shared[4] - 0.03).abs() < 0.015, "{shared:?}");
+    assert!(judged.amendment.notes.iter().any(|n| n.contains("sensor errors in common")));
+    assert!(dropped.model.known.installation.is_none());
 }
 
 #[test]
