@@ -219,17 +219,22 @@ fn of_right(
         before,
         after,
         notes,
-        settings: Settings {
-            lengths_s: FitOptions::default().lengths_s,
-            horizons_s: options.horizons_s.clone(),
-            judged_at_s: JUDGED_AT_S,
-            per_flight: options.per_flight,
-        },
+        settings: settings(options),
     };
     let rudder = rudder::unmodelled(flights, model).or(rudder::unmodelled(held_out, model));
     amendment.sentences = rudder.map(rudder::warning).into_iter().collect();
     amendment.sentences.extend(story::sentences(&amendment));
     Ok(Amended { amendment, model: fit.model, tuned: tuned.model })
+}
+
+/// Settings of an amendment with `options`, for its report.
+fn settings(options: &Options) -> Settings {
+    Settings {
+        lengths_s: FitOptions::default().lengths_s,
+        horizons_s: options.horizons_s.clone(),
+        judged_at_s: JUDGED_AT_S,
+        per_flight: options.per_flight,
+    }
 }
 
 /// Horizon at which the amended model is compared with the model as given, s. `given` are the scores of the model as given on
