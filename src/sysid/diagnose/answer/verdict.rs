@@ -105,7 +105,12 @@ fn of_one_flight(effects: &[Candidate]) -> String {
             true => format!(" (takes {:.0} % of the error on held-out segments)", 100.0 * share),
             false => String::new(),
         };
-        format!(" The nearest is {}{taken}, which is not enough to assert it.", c.id)
+        match c.refused.first() {
+            Some(why) => {
+                format!(" The nearest is {}{taken}; it is not asserted, because {why}.", c.id)
+            }
+            None => format!(" The nearest is {}{taken}, which is not enough to assert it.", c.id),
+        }
     });
     format!(
         "One flight cannot say whether the model lacks anything.{nearest} Fly more flights and diagnose them together."
@@ -188,8 +193,10 @@ mod tests {
         assert_eq!(
             said,
             "One flight cannot say whether the model lacks anything. The nearest is rate_limit (takes 41 % of the error \
-             on held-out segments), which is not enough to assert it. Fly more flights and diagnose them together."
+             on held-out segments); it is not asserted, because one of two. Fly more flights and diagnose them together."
         );
+        let weak = of_one_flight(&[candidate(30.0, f64::NAN, Status::NotShown, &[])]);
+        assert!(weak.contains("is rate_limit, which is not enough to assert it."), "{weak}");
         assert!(!of_one_flight(&[]).contains("nearest"));
     }
 }
