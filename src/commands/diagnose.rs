@@ -1,4 +1,4 @@
-//! `greylag diagnose`: finds the physical effects that a model lacks.
+//! `greylag diagnose`: finds the effects (physical contributions to forces and moments) that a model lacks.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -48,14 +48,13 @@ pub struct Arguments {
     /// Write a report as one HTML page to this file.
     #[arg(long)]
     report: Option<PathBuf>,
-    /// Number of bootstrap draws under the null hypothesis (no effect is missing); they give the thresholds that the evidence
-    /// for a missing effect must exceed.
+    /// Number of bootstrap draws under the null hypothesis (no effect is missing), which give the thresholds of the evidence.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(20..))]
     nulls: u16,
     /// Seed of all random draws.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Effect files (TOML) or folders of them, tried as candidates in addition to the catalogue.
+    /// Effect files (TOML) or folders of them, tried as candidates in addition to the catalogue of known effects.
     #[arg(long = "effect", value_name = "FILE", num_args = 1..)]
     effects: Vec<String>,
     /// Ids of effects of the catalogue that are not to be tried.
@@ -136,8 +135,7 @@ struct Document<'a> {
     answer: &'a Answer,
 }
 
-/// If no effect is missing, re-estimation of the coefficients (tuning) is recommended from this reduction of the free-run
-/// (open-loop simulation) error on, %.
+/// Reduction of the error of free runs (open-loop simulations) from which re-estimation alone (tuning) is recommended, %.
 const WORTH_TUNING: f64 = 1.0;
 
 /// The command to run next. `words` maps the id of an effect to the path of its effect file. `change_percent` is the change of
@@ -175,9 +173,8 @@ fn next(
     }
 }
 
-/// The option of `greylag amend` that adds the effects `ids`. With `--accept` the command would diagnose the fitted logs alone
-/// and could find nothing. The fit tries several effects of the file `written` of the diagnosis together, so this file is
-/// preferred to their names. Effects that come from effect files, in `words`, are always named.
+/// The option of `greylag amend` that adds the effects `ids`. Several effects are given by the file `written` of the diagnosis,
+/// because the fit then tries them together. Effects that come from effect files, in `words`, are always named.
 fn added(ids: &[&str], words: &BTreeMap<String, String>, written: Option<&Path>) -> String {
     let from_files = ids.iter().any(|id| words.contains_key(*id));
     match written {
@@ -195,8 +192,7 @@ fn design(model: &str, pair: &[String; 2], words: &BTreeMap<String, String>) -> 
     format!("greylag design --model {model} --between {a} {b}")
 }
 
-/// The command that estimates a misalignment of the sensor axes for each flight. It is recommended if these flights cannot
-/// distinguish the misalignment from the asserted effects.
+/// The command that estimates a misalignment of the sensor axes, from which these flights do not distinguish the missing effects.
 fn turned(model: &str, logs: &str, out: &str) -> String {
     format!("greylag amend --model {model}{logs} --tune-only --axes-askew 3 --out {out}")
 }
