@@ -114,9 +114,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// The summary for a model and its refit by `greylag amend` (an amendment). It separates the change of the error by
-/// re-estimated coefficients from the change by added effects. `None` unless there are two models and the second was amended
-/// from the first.
+/// The summary for a model and its refit by `greylag amend` (an amendment). It separates the change of the error by re-estimated
+/// coefficients from the change by added effects (physical contributions to forces and moments). `None` unless there are two
+/// models and the second was amended from the first.
 #[cfg(feature = "study")]
 fn traced(
     arguments: &Arguments,

@@ -1,4 +1,5 @@
-//! `greylag design`: finds the flight-test manoeuvre whose data best distinguish two effects, one of which a model may lack.
+//! `greylag design`: finds the flight-test manoeuvre whose data best distinguish two effects, one of which a model may lack. An
+//! effect is a physical contribution to forces and moments.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -20,7 +21,7 @@ pub struct Arguments {
     /// The model that lacks both effects.
     #[arg(long, value_name = "FILE")]
     model: PathBuf,
-    /// The two effects: ids of the catalogue, or effect files (TOML).
+    /// The two effects: ids of the catalogue (see `greylag effects`), or effect files (TOML).
     #[arg(long, value_name = "ID|FILE", num_args = 2, required = true)]
     between: Vec<String>,
     /// Values of an effect's constants, in the order of `greylag effects show`, instead of typical ones (may be repeated).

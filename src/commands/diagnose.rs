@@ -1,4 +1,4 @@
-//! `greylag diagnose`: finds the physical effects that a model lacks.
+//! `greylag diagnose`: finds the effects (physical contributions to forces and moments) that a model lacks.
 
 mod next;
 
@@ -49,14 +49,13 @@ pub struct Arguments {
     /// Write a report as one HTML page to this file.
     #[arg(long)]
     report: Option<PathBuf>,
-    /// Number of bootstrap draws under the null hypothesis (no effect is missing); they give the thresholds that the evidence
-    /// for a missing effect must exceed.
+    /// Number of bootstrap draws under the null hypothesis (no effect is missing), which give the thresholds of the evidence.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(20..))]
     nulls: u16,
     /// Seed of all random draws.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Effect files (TOML) or folders of them, tried as candidates in addition to the catalogue.
+    /// Effect files (TOML) or folders of them, tried as candidates in addition to the catalogue of known effects.
     #[arg(long = "effect", value_name = "FILE", num_args = 1..)]
     effects: Vec<String>,
     /// Ids of effects of the catalogue that are not to be tried.

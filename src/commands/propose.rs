@@ -1,5 +1,5 @@
-//! `greylag propose`: searches for a formula that describes those errors of a model that no effect of the catalogue
-//! explains.
+//! `greylag propose`: searches for a formula that describes those errors of a model that no effect of the catalogue explains. An
+//! effect is a physical contribution to forces and moments. The catalogue has the effects that the program knows.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

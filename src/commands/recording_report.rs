@@ -23,8 +23,8 @@ use crate::sim::episode::{attitude_error_deg, settled_error_deg};
 use crate::sysid::compare::{self, Comparison};
 use crate::sysid::flight_path;
 
-/// Largest settled error that counts as tracked, degrees: half of what section V-E of \[GSFM26\] calls "near-perfect
-/// tracking".
+/// Largest settled error that counts as tracked, degrees: half of what section V-E of \[GSFM26\] (see `src/lib.rs`) calls
+/// "near-perfect tracking".
 pub const TOLERANCE_DEG: f64 = 0.5;
 
 /// Inputs of the report besides the recording.

@@ -1,5 +1,5 @@
-//! `greylag workbench`: a page in the browser on which a model is compared with flight logs and effects that it lacks are
-//! added to it. A session keeps the model, the flights and the results in a folder.
+//! `greylag workbench`: a page in the browser on which a model is compared with flight logs and effects (physical contributions
+//! to forces and moments) that it lacks are added to it. A session keeps the model, the flights and the results in a folder.
 
 use std::io::Write;
 use std::path::PathBuf;

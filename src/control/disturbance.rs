@@ -16,11 +16,12 @@ pub(crate) const NONE: State =
 /// Default time constant of the estimate, s. With a shorter time constant the estimate follows the noise. With a longer one
 /// it lags behind manoeuvres.
 pub(crate) const TIME_CONSTANT_S: f64 = 0.3;
-/// Default limit of the prediction error relative to the measured motion. Above it, planning does not use the model. In still
-/// air the error of `params/x8/learned` stays below the limit, and that of `prior-as-printed` almost always exceeds it
+/// Default limit of the ratio of prediction error to measured motion, both as root mean squares over about half a second. A
+/// model above the limit is not used for planning, unless the errors look like gusts ([`SLOPE`]). In still air, planning was
+/// always possible with `params/x8/learned` and almost never with `prior-as-printed`, whose inertia has the wrong sign
 /// (`results/notes/2026-11-27-learned-models.md`).
 pub(crate) const TRUST: f64 = 0.5;
-/// Averaging time of the squared prediction errors and measured changes, s: a few periods of the short-period mode.
+/// Averaging time of the squares of prediction errors and of measured changes, s: a few periods of the short-period mode.
 const MEMORY_S: f64 = 0.5;
 /// Averaging time of the regression of prediction errors on predictions, s. Gusts average out over this time.
 const SLOPE_MEMORY_S: f64 = 2.0;
@@ -28,8 +29,9 @@ const SLOPE_MEMORY_S: f64 = 2.0;
 /// the model is rejected. The slope is near 0 in gusts, and −1 if the predicted change did not happen at all.
 /// `docs/validation/controllers.md` has values in turbulence for right and wrong models.
 const SLOPE: f64 = 0.7;
-/// Motion that is added to the measured motion before the prediction error is related to it, in x_c per second. x_c is the
-/// characteristic scale of a state (eq. 21 of \[GSFM26\]). Small errors in calm flight therefore do not count as large.
+/// Rate of change whose square is added to the mean squares of the measured and of the predicted change before the errors are
+/// divided by them, in x_c per second. Without it, small errors in calm flight would count as large. x_c is the characteristic
+/// scale of a state (eq. 21 of \[GSFM26\], see `src/lib.rs`).
 const CALM: f64 = 0.02;
 
 /// Recursive estimator of the disturbance and of the model's prediction error.
@@ -87,9 +89,9 @@ impl Disturbance {
         }
     }
 
-    /// Updates the error statistics with one step's prediction error `missed` and measured change `happened`.
+    /// Updates the error statistics with the prediction error `missed` and the measured change `happened` of one step.
     fn compare(&mut self, model: &GreyBox, missed: &State, happened: &State) {
-        // only body rates and flow angles are compared, in x_c per second: attitude and airspeed follow from them by integration
+        // only p, q, r, α and β are compared, in x_c per second; attitude and airspeed are not
         let scale = model.scale();
         let scaled = |change: &State| -> [f64; 5] {
             let change = change.to_array();

@@ -24,7 +24,8 @@ use insight::Insight;
 
 use greylag_physics::{ActuatorState, Command, State, Time};
 
-/// Input of a controller: eq. (27) of \[GSFM26\] (T. Guerin et al., 2026), and the altitude, which sets the air density.
+/// Input of a controller: eq. (27) of \[GSFM26\] (T. Guerin et al., 2026, see `src/lib.rs`), and the altitude, which sets the air
+/// density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
     /// Time of the measurement on the vehicle's clock.

@@ -1,4 +1,4 @@
-//! The reinforcement-learning task: the reward for attitude tracking, eq. (30) of \[GSFM26\].
+//! The reinforcement-learning task: the reward for attitude tracking, eq. (30) of \[GSFM26\] (see `src/lib.rs`).
 
 use crate::Target;
 use greylag_num::Real;

@@ -127,7 +127,8 @@ impl Desk {
         self.anchor.map_or(Time::default(), |(at, time)| time.plus(host.saturating_sub(at)))
     }
 
-    /// Arms the companion, as a client's request does. If the vehicle cannot be engaged, rejects the request with the reason.
+    /// Arms the companion, as the request of a client (a ground station or an offboard program) does. If the vehicle cannot be
+    /// engaged, rejects the request with the reason.
     pub fn arm(&mut self, host: Duration) -> Verdict {
         match self.vehicle.obstacle() {
             Some(obstacle) => Verdict::Rejected(obstacle),

@@ -22,7 +22,7 @@ pub struct Checkpoint {
     pub coordinates: Vec<f64>,
     /// State of the optimiser.
     pub adam: Adam,
-    /// λ of eq. (24) of \[GSFM26\] (T. Guerin et al., 2026): the penalty on the residual is divided by it.
+    /// λ of eq. (24) of \[GSFM26\] (T. Guerin et al., 2026, see `src/lib.rs`): the penalty on the residual is divided by it.
     pub lambda: f64,
     /// Number of updates made.
     pub update: u64,

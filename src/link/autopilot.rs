@@ -1,5 +1,5 @@
-//! The interface through which MAVLink clients use the autopilot. The protocol code knows only this interface and not the pilot,
-//! which is the flight logic of the companion.
+//! The interface through which MAVLink clients (ground stations and offboard programs) use the autopilot. The protocol code knows
+//! only this interface and not the pilot, which is the flight logic of the companion.
 
 use greylag_physics::{ActuatorState, Command, Time};
 

@@ -1,4 +1,4 @@
-//! Routing of MAVLink frames between clients and a flight controller.
+//! Routing of MAVLink frames between clients (ground stations and offboard programs) and a flight controller.
 //!
 //! Frames that are not addressed to this program are forwarded unmodified. A frame from the controller to a
 //! target goes to the peers from which frames of that target have arrived. A frame without a target goes to all peers.

@@ -2,8 +2,8 @@
 //! through channels.
 //!
 //! Received bytes go into a bounded channel that the caller chooses for each link. The vehicle's bytes can therefore be served
-//! before those of the clients. Frames to be sent go into a bounded channel of the link. If a channel is full, frames are
-//! dropped and counted. No call blocks.
+//! before those of the clients (ground stations and offboard programs). Frames to be sent go into a bounded channel of the link.
+//! If a channel is full, frames are dropped and counted. No call blocks.
 
 mod flood;
 mod serial;

@@ -75,8 +75,8 @@ impl Term {
     }
 }
 
-/// Grey-box model ṡ = F_p(s, z; θ_p) + F_a(s, z; θ_a), eq. (19) of \[GSFM26\] (T. Guerin et al., 2026): physical effects F_p on a
-/// rigid body, and a learned residual F_a.
+/// Grey-box model ṡ = F_p(s, z; θ_p) + F_a(s, z; θ_a), eq. (19) of \[GSFM26\] (T. Guerin et al., 2026, see `src/lib.rs`):
+/// physical effects F_p on a rigid body, and a learned residual F_a.
 ///
 /// The model has parameters and equations but no flight state. All evaluations take `&self`, so one model can serve
 /// several threads. Units are SI and radians, body axes are FRD. The methods are of four kinds:

@@ -17,7 +17,7 @@ pub const STEP: f64 = 0.01;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Integrator {
-    /// Classical fourth-order Runge–Kutta, as in \[GSFM26\].
+    /// Classical fourth-order Runge–Kutta, as in \[GSFM26\] (see `src/lib.rs`).
     Rk4,
     /// JSBSim's default (`FGPropagate`): body rates and attitude by explicit Euler, velocity by Adams–Bashforth 2 in earth axes.
     /// The scheme stores the last acceleration.

@@ -1,5 +1,6 @@
-//! The learned residual F_a(s, z; θ_a), eq. (19) of \[GSFM26\]: a small neural network. Its output is added to the state rates
-//! (time derivatives of the state) of the model's physical part.
+//! The learned residual F_a(s, z; θ_a), eq. (19) of \[GSFM26\] (see `src/lib.rs`): a small neural network with the parameters
+//! θ_a. Its output for the state s and the actuator state z is added to the state rates (time derivatives of the state) of the
+//! model's physical part.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -21,7 +22,8 @@ use greylag_physics::{Airframe, Controls, State};
 /// exactly. A residual that was learned in one attitude is therefore valid in every other.
 pub const INPUTS: usize = 9;
 
-/// Number of outputs of the network: the rates of the eight states, in units of x_c (eq. 21) per second.
+/// Number of outputs of the network: the rates of the eight states, in units of x_c per second. x_c is the characteristic scale
+/// of each state (eq. 21).
 pub const OUTPUTS: usize = 8;
 
 /// Name of the tensor in a residual's file that describes the envelope of its training data, see [`DataEnvelope`].
@@ -146,9 +148,10 @@ pub fn hash(bytes: &[u8]) -> String {
 }
 
 impl Scales {
-    /// Scales for the aircraft of `airframe`. Airspeed is relative to V0, its x_c, in units of V0/4. The rates p, q and r are in
-    /// units of 0.1, 0.02 and 0.05 times their x_c, which are typical of brisk flight. Angles are in units of 0.2 rad (about the
-    /// stall), deflections in units of the largest travel. Throttle is relative to 0.5, in units of 0.5.
+    /// Scales for the aircraft of `airframe`. The scaled airspeed is its difference from V0 in units of V0/4. V0 is the reference
+    /// airspeed, the airspeed's x_c. The units of p, q and r are 0.1, 0.02 and 0.05 times their x_c, which are typical of fast
+    /// manoeuvres. The unit of α and β is 0.2 rad, about the stall angle. The unit of a deflection is the largest deflection of
+    /// its surface. The scaled throttle is the difference from 0.5 in units of 0.5.
     pub fn new(airframe: &Airframe, x_c: [f64; OUTPUTS]) -> Scales {
         let [_, _, v0, p, q, r, _, _] = x_c;
         let unit = [0.25 * v0, 0.1 * p, 0.02 * q, 0.05 * r, 0.2, 0.2];
@@ -167,7 +170,7 @@ impl Scales {
     pub fn inputs<R: Real>(&self, state: &State<R>, controls: &Controls<R>) -> [R; INPUTS] {
         let State { airspeed, p, q, r, alpha, beta, .. } = *state;
         let Controls { aileron, elevator, throttle, .. } = *controls;
-        // a plain loop, because a closure that is not inlined would leave the caller's vector instructions
+        // a plain loop: a closure might not be inlined, and would then not use the vector instructions of the caller
         let mut x = [airspeed, p, q, r, alpha, beta, aileron, elevator, throttle];
         for (i, x) in x.iter_mut().enumerate() {
             *x = (*x - R::from_f64(self.offset[i])).scale(self.factor[i]);
@@ -186,7 +189,7 @@ impl Scales {
 }
 
 impl Residual {
-    /// A residual of `network` for the aircraft of `airframe`, whose characteristic scale is `x_c`, eq. (21).
+    /// A residual of `network` for the aircraft of `airframe`. `x_c` is the characteristic scale of each state, eq. (21).
     ///
     /// # Errors
     /// If the network does not have `INPUTS` inputs and `OUTPUTS` outputs, or a layer is too wide.
@@ -247,7 +250,7 @@ impl Residual {
         weights::to_bytes(&self.network, envelope, origin)
     }
 
-    /// Reads the file of a residual for `airframe`, whose characteristic scale is `x_c`, eq. (21).
+    /// Reads the file of a residual for `airframe`. `x_c` is the characteristic scale of each state, eq. (21).
     ///
     /// # Errors
     /// If the file cannot be read, is not a residual, or is a residual of another airframe.

@@ -87,7 +87,7 @@ impl Envelope {
 /// Reference flight condition of an aircraft.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reference {
-    /// Reference airspeed V0 of the state's characteristic scale x_c, eq. (21) of \[GSFM26\], m/s.
+    /// Reference airspeed V0 of the state's characteristic scale x_c, eq. (21) of \[GSFM26\] (see `src/lib.rs`), m/s.
     pub airspeed: f64,
     /// Altitude at which controllers are designed and models are trimmed and simulated, m above mean sea level.
     pub altitude: f64,
@@ -162,7 +162,7 @@ pub struct Airframe {
     pub name: String,
     /// Wing area, span and chord.
     pub geometry: Geometry,
-    /// Actuator filters at a time step of 0.01 s.
+    /// Travels and rate limits of the surfaces, and the filters of surfaces and throttle for a time step of 0.01 s.
     pub actuators: ActuatorFigures,
     /// Whether the file's schema can describe a rudder.
     pub yaw: Yaw,
@@ -314,8 +314,8 @@ impl Airframe {
     /// Reads an airframe file of schema 2, or of schema 1 from earlier programs.
     ///
     /// # Errors
-    /// If the file cannot be read, has a syntax error or another schema, or has a number outside the range of
-    /// aircraft.
+    /// If the file cannot be read, has a syntax error or another schema, lacks an entry, or has a number outside its accepted
+    /// range.
     pub fn load(path: &Path) -> Result<Airframe, FileError> {
         let what = "airframe file";
         let text = crate::text_file::read(path).map_err(|why| FileError::Read {

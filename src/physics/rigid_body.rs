@@ -1,4 +1,5 @@
-//! Rigid-body dynamics: the rates of the state for given forces and moments, eqs. (7)–(12) and (35) of \[GSFM26\].
+//! Rigid-body dynamics: the rates of the state for given forces and moments, eqs. (7)–(12) and (35) of \[GSFM26\] (see
+//! `src/lib.rs`).
 
 use crate::wrench::Channel;
 use crate::{AirData, State, Wrench};

@@ -2,7 +2,7 @@
 
 use greylag_num::{Real, each};
 
-/// The physical state s^p = \[φ, θ, V_a, p, q, r, α, β\], eq. (4) of \[GSFM26\] (T. Guerin et al., 2026).
+/// The physical state s^p = \[φ, θ, V_a, p, q, r, α, β\], eq. (4) of \[GSFM26\] (T. Guerin et al., 2026, see `src/lib.rs`).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct State<R = f64> {
     /// Roll angle φ, rad.

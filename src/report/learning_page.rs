@@ -18,7 +18,7 @@ pub struct Training {
     pub seeds: Vec<(String, Vec<CurvePoint>)>,
 }
 
-/// The trainings to be compared on the page, as in Figure 2 of \[GSFM26\].
+/// The trainings to be compared on the page, as in Figure 2 of \[GSFM26\] (see `src/lib.rs`).
 #[derive(Clone, Debug)]
 pub struct LearningReport<'a> {
     /// Title of the page.

@@ -1,4 +1,4 @@
-//! Data collection for model learning: exploratory episodes in JSBSim, section IV-A of \[GSFM26\].
+//! Data collection for model learning: exploratory episodes in JSBSim, section IV-A of \[GSFM26\] (see `src/lib.rs`).
 
 use rand::seq::SliceRandom;
 use rand::{Rng, RngExt as _};

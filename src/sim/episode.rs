@@ -1,4 +1,5 @@
-//! One episode of the protocol of \[GSFM26\] (T. Guerin et al., 2026): 1000 steps from level flight at 16.67 m/s to one target.
+//! One episode of the protocol of \[GSFM26\] (T. Guerin et al., 2026, see `src/lib.rs`): 1000 steps from level flight at 16.67
+//! m/s to one target.
 
 use std::time::{Duration, Instant};
 

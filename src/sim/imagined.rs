@@ -1,5 +1,5 @@
 //! Many aircraft simulated at once by a model in SIMD lanes, for the training of policies (section IV-B of \[GSFM26\], T.
-//! Guerin et al., 2026).
+//! Guerin et al., 2026, see `src/lib.rs`).
 
 use std::sync::Arc;
 

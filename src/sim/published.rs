@@ -1,4 +1,5 @@
-//! Published results of the controllers of \[GSFM26\] (T. Guerin et al., 2026), for comparison with evaluations.
+//! Published results of the controllers of \[GSFM26\] (T. Guerin et al., 2026, see `src/lib.rs`), for comparison with
+//! evaluations.
 //!
 //! The settled error is the mean of the roll and pitch RMSE over the last fifth of a flight to a target.
 

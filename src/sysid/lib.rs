@@ -1,5 +1,5 @@
-//! System identification from flight logs: reconstructs flight paths, compares models with flights, ranks the physical
-//! effects that a model lacks, and re-estimates models.
+//! System identification from flight logs: reconstructs flight paths, compares models with flights, ranks the physical effects
+//! (contributions to forces and moments) that a model lacks, and re-estimates models.
 
 #[cfg(feature = "study")]
 pub mod amend;

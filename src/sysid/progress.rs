@@ -9,7 +9,8 @@ pub struct Stage<'a> {
     pub doing: &'a str,
     /// Estimated share of the whole task that is done, 0 to 1. It may fall, for example when a search repeats a step.
     pub fraction: f64,
-    /// Candidate effects of a diagnosis, best first. It is empty in all stages but that after the first ranking.
+    /// Candidates of a diagnosis (effects that the model may lack), best first. It is empty in all stages but that after the
+    /// first ranking.
     pub ranking: &'a [FirstLook],
 }
 

@@ -1,4 +1,5 @@
-//! Separation of two candidate effects: how well a flight distinguishes them after the model's coefficients are refitted.
+//! Separation of two candidates, which are effects (physical contributions to forces and moments) that a model may lack: how well
+//! a flight distinguishes them after the model's coefficients are refitted.
 //!
 //! A channel is a force or a moment. A window is a short section of the flight over which the channels are averaged.
 

@@ -1,5 +1,5 @@
-//! Signature of an effect: curves that show how the effect changes forces and moments over one variable at a time (a sweep), and
-//! how it changes the response of the aircraft to a manoeuvre.
+//! Signature of an effect (a physical contribution to forces and moments): curves that show how the effect changes forces and
+//! moments over one variable at a time (a sweep), and how it changes the response of the aircraft to a manoeuvre.
 
 use greylag_model::{GreyBox, JoinError, STEP, Trim, TrimError, Twin};
 use greylag_physics::effects::Description;

@@ -28,8 +28,8 @@ struct Parameter {
     value: Option<f64>,
 }
 
-/// The effects that the diagnosis in `path` asserts to be missing in the model named `model`. The diagnosed coefficients are
-/// the starting values of their fit.
+/// The effects (physical contributions to forces and moments) that the diagnosis in `path` asserts to be missing in the model
+/// named `model`. The diagnosed coefficients are the starting values of their fit.
 pub fn asserted(path: &Path, model: &str) -> Result<Vec<Added>> {
     let text = std::fs::read_to_string(path)
         .with_context(|| format!("cannot read the diagnosis {}", path.display()))?;

@@ -1,4 +1,5 @@
-//! `greylag campaign`: plans, runs, gathers and reports many runs over prior models, controllers and seeds.
+//! `greylag campaign`: plans, runs, gathers and reports many runs over prior (physical) models, controllers and seeds. A cell is
+//! one of these runs.
 
 mod cost;
 mod gather;

@@ -22,7 +22,7 @@ const SCHEMA: &str = "greylag.learn/1";
 struct File {
     schema: String,
     program: String,
-    /// SHA-256 of prior, airframe, logs, commands and program version.
+    /// SHA-256 of prior model, airframe, logs, commands and program version.
     identity: String,
     stages: Vec<Done>,
 }

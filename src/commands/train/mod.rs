@@ -23,8 +23,8 @@ pub struct Arguments {
 
 #[derive(clap::Subcommand)]
 enum What {
-    /// Learn a dynamics model: a neural network for the part of the motion that the prior model does not explain, and with
-    /// --trainable also coefficients of the prior.
+    /// Learn a dynamics model: a neural network for the part of the motion that the prior (physical) model does not explain, and
+    /// with --trainable also coefficients of the prior.
     Dynamics(Box<dynamics::Arguments>),
     /// Train a policy in a model, or in JSBSim.
     Policy(Box<policy::Arguments>),

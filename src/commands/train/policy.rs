@@ -58,10 +58,11 @@ pub struct Arguments {
     /// Initial learning rate of the analytic policy gradient.
     #[arg(long, default_value_t = AnalyticRecipe::default().rate)]
     climb: f64,
-    /// Error of roll or pitch (rad) or airspeed (m/s) below which the analytic policy gradient smooths the reward.
+    /// Error of roll or pitch (rad) or airspeed (m/s) below which the reward of the analytic policy gradient is quadratic
+    /// in the error. For larger errors it is linear.
     #[arg(long, default_value_t = AnalyticRecipe::default().rounding)]
     rounding: f64,
-    /// Weight of the squared change of the commands per step in the objective of the analytic policy gradient.
+    /// Weight of the squared change of aileron and elevator command per step in the objective of the analytic policy gradient.
     #[arg(long, default_value_t = AnalyticRecipe::default().effort)]
     effort: f64,
     /// Number of aircraft that are simulated in parallel in the model, for TD3 and for the fit of the critics.
@@ -110,12 +111,13 @@ pub struct Arguments {
     /// Standard deviation of the noise that smooths the target policy of TD3.
     #[arg(long, default_value_t = 0.2)]
     smoothing: f64,
-    /// Fraction (0 to 1) of the commanded attitudes that lie in the hard corners (45° to 60° of roll with 25° to 30° of pitch);
-    /// the paper has 0.
+    /// Probability (0 to 1) that a commanded attitude is drawn from the hard corners (45° to 60° of roll with 25° to 30° of
+    /// pitch) instead of the whole range; 0 in the paper (T. Guerin et al., 2026).
     #[arg(long, default_value_t = 0.0)]
     corners: f64,
-    /// Number of models in which the analytic policy gradient flies (domain randomisation). They are drawn from the prior
-    /// distributions of the coefficients of the --env model; with 0 it flies in that model itself, as the critics always do.
+    /// Number of models in which the analytic policy gradient flies (domain randomisation). Their coefficients are drawn from
+    /// the prior distributions that the --env model states. With 0 it flies in the --env model itself. The critics are always
+    /// fitted to flights in the --env model.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4096))]
     draws: u64,
     /// Number of steps of TD3 between two evaluations, which fly in the environment of the training.
@@ -169,7 +171,7 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let seeds = arguments.seed..end;
     println!("{:>8} {COLUMNS}", "seed");
     let one = |seed: u64| arguments.train(&ground, seed, stop);
-    // the same number of threads as rayon's global pool, which a scheduler limits by RAYON_NUM_THREADS
+    // the pool has as many threads as rayon's global pool; a job scheduler can limit that number by RAYON_NUM_THREADS
     let pool = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads()).build()?;
     use rayon::prelude::*;
     let seeds: Vec<u64> = seeds.collect();
@@ -177,8 +179,8 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let page = arguments.out.join(REPORT);
     match curves::draw(&arguments.out, &page) {
         Ok(()) => println!("report in {}", page.display()),
-        // there are no curves because the training failed, and its error is returned below
         Err(error) if ended.is_ok() => eprintln!("no learning curves were drawn: {error:#}"),
+        // the training has failed as well, and its error is returned below
         Err(_) => (),
     }
     let ended = ended?;

@@ -1,5 +1,6 @@
-//! CEM-MPC planner (section III-D of \[GSFM26\]): each tick (10 ms) it samples candidate plans, simulates them with the model and
-//! ranks them by their return. With a policy's proposals and critics' values it is the hybrid controller of section IV-C.
+//! CEM-MPC planner (section III-D of \[GSFM26\], see `src/lib.rs`): each tick (10 ms) it samples candidate plans, simulates them
+//! with the model and ranks them by their return. With a policy's proposals and critics' values it is the hybrid controller of
+//! section IV-C.
 
 mod candidates;
 mod changes;

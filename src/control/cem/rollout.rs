@@ -19,7 +19,7 @@ use greylag_physics::{ActuatorState, Airframe, Command, State};
 /// Number of candidates in a block, one per lane of the vector.
 pub(super) const WIDTH: usize = ROW;
 
-/// Planning horizon H of \[GSFM26\], steps.
+/// Planning horizon H of \[GSFM26\] (see `src/lib.rs`), steps.
 pub(super) const HORIZON: usize = 5;
 
 /// The actions (aileron, elevator, throttle of eq. 29) of `WIDTH` candidates over the horizon.

@@ -1,6 +1,7 @@
 //! Settings of the CEM planner (cross-entropy method). Every control tick it samples candidate plans, simulates them with the
-//! model, and ranks them by their return, the sum of the rewards. Critics are networks that estimate the further return from
-//! the terminal state of a plan. The base controller is an LQI that flies where no plan is better. "The paper" is \[GSFM26\].
+//! model, and ranks them by their return, the sum of the rewards. Critics are networks that estimate the further return from the
+//! terminal state of a plan. The base controller is an LQI that flies where no plan is better. "The paper" is \[GSFM26\] (see
+//! `src/lib.rs`).
 
 use super::changes::Change;
 use super::rollout::HORIZON;

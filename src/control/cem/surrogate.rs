@@ -14,7 +14,8 @@ use greylag_num::Real;
 /// undetermined in every direction in which the terminal states do not vary.
 const RIDGE: f64 = 1e-4;
 
-/// The fitted function v(o) = level + slope · (o − centre). The observation o describes a state as in eq. (28) of \[GSFM26\].
+/// The fitted function v(o) = level + slope · (o − centre). The observation o describes a state as in eq. (28) of \[GSFM26\] (see
+/// `src/lib.rs`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Surrogate {
     centre: [f64; N],

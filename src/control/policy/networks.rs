@@ -5,7 +5,7 @@ use greylag_num::dense::Units;
 use greylag_num::{Dense, Lanes, Real};
 use greylag_physics::Command;
 
-/// Number of components of an action: aileron, elevator and throttle, each −1..1 (eq. 29 of \[GSFM26\]).
+/// Number of components of an action: aileron, elevator and throttle, each −1..1 (eq. 29 of \[GSFM26\], see `src/lib.rs`).
 pub const ACTIONS: usize = 3;
 
 /// Number of aircraft in a block, one per vector lane.

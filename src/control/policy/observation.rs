@@ -1,5 +1,5 @@
 //! The observation, which is the input of a policy (a neural network). It has the fifteen components of eq. (28) of \[GSFM26\]
-//! and the airspeed error, all scaled to order one.
+//! (see `src/lib.rs`) and the airspeed error, all scaled to order one.
 
 use crate::Target;
 use greylag_num::Real;
@@ -8,8 +8,8 @@ use greylag_physics::{ActuatorState, State};
 /// Number of components of an observation.
 pub const OBSERVATIONS: usize = 16;
 
-/// Scale by which each component is divided, in the order of [`observe`], in rad, m/s, rad/s and throttle (0..1). In brisk
-/// flight, at full deflection and after a step to a large commanded angle, the scaled components are of order one.
+/// Scale by which each component is divided, in the order of [`observe`], in rad, m/s, rad/s and throttle (0..1). In fast
+/// manoeuvres, at full deflection and after a step to a large commanded angle, the scaled components are of order one.
 pub const UNIT: [f64; OBSERVATIONS] =
     [1.0, 0.5, 4.0, 2.0, 1.0, 1.0, 0.2, 0.2, 0.5, 10.0, 0.5, 10.0, 0.5, 0.5, 0.25, 4.0];
 

@@ -1,5 +1,6 @@
 //! Failsafes of the pilot, the part of the companion that decides on each command. They act on the loss and the recovery of the
-//! link to the vehicle, on the loss of a client's setpoints or stick inputs, and on a restart of the vehicle.
+//! link to the vehicle, on the loss of the setpoints or stick inputs of a client (a ground station or an offboard program), and
+//! on a restart of the vehicle.
 
 use std::time::Duration;
 

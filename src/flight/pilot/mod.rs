@@ -57,12 +57,12 @@ const SWINGS_AGAIN_S: f64 = 20.0;
 ///
 /// - set-up before flight: [`Pilot::take_on`], [`Pilot::follow`], [`Pilot::protect_with`], [`Pilot::monitor_with`],
 ///   [`Pilot::estimate_with`];
-/// - time: [`Pilot::advance`], about every 10 ms, with or without frames, and [`Pilot::excuse`] after a stall of
-///   this computer;
+/// - time: [`Pilot::advance`], about every 10 ms, with or without frames, and [`Pilot::excuse`] after a stall of this computer;
 /// - tick: [`Pilot::observe`] with a state frame, then [`Pilot::decide`] with the plan for the request that `observe`
 ///   returned, once per frame and in this order; [`Pilot::monitor`] after the command is out;
-/// - requests of clients: the trait [`Autopilot`](greylag_link::autopilot::Autopilot), between two ticks;
-/// - vehicle: [`Pilot::engaged`] when a flight controller, not the simulator's shim, has given control authority.
+/// - requests of clients (ground stations, offboard programs): the trait
+///   [`Autopilot`](greylag_link::autopilot::Autopilot), between two ticks;
+/// - vehicle: [`Pilot::engaged`] when a flight controller, not the simulator's MAVLink side, has given control authority.
 ///
 /// All times are vehicle time and must not decrease. A clock that jumps back by more than 1 s counts as a restart of
 /// the vehicle; the pilot then drops all earlier states.

@@ -1,4 +1,5 @@
-//! Requests of clients to the pilot (the companion's flight logic): arming, modes, setpoints and parameters.
+//! Requests of clients (ground stations and offboard programs) to the pilot (the companion's flight logic): arming, modes,
+//! setpoints and parameters.
 
 use super::estimate::within;
 use super::{Pilot, Source, parameters};

@@ -1,4 +1,5 @@
-//! The MAVLink parameters that clients can read and set, and the settings of the pilot that they change.
+//! The MAVLink parameters that clients (ground stations and offboard programs) can read and set, and the settings of the pilot
+//! that they change.
 
 use super::config::{Config, ThrustSource};
 use greylag_link::autopilot::{Parameter, ParameterValue, Verdict};

@@ -1,5 +1,6 @@
-//! A flight-test schedule that the pilot flies in OFFBOARD mode instead of a client's setpoints. It is a sequence of targets
-//! (attitudes and airspeeds) and of excitations, which are signals added to a target or a command.
+//! A flight-test schedule that the pilot flies in OFFBOARD mode instead of the setpoints of a client (a ground station or an
+//! offboard program). It is a sequence of targets (attitudes and airspeeds) and of excitations, which are signals added to a
+//! target or a command.
 
 use super::texts::Texts;
 use greylag_control::Target;

@@ -1,5 +1,5 @@
 //! The target of a tick (roll, pitch and airspeed to be flown) before the envelope limits it. It comes from the flight-test
-//! schedule or from a client's setpoint or sticks, else it is level flight.
+//! schedule or from the setpoint or sticks of a client (a ground station or an offboard program), else it is level flight.
 
 use super::{Pilot, ThrustSource, due};
 use greylag_control::Target;

@@ -1,4 +1,5 @@
-//! The control thread: a loop that answers each state frame, a message with the vehicle's state, and then serves clients.
+//! The control thread: a loop that answers each state frame, a message with the vehicle's state, and then serves clients (ground
+//! stations and offboard programs).
 
 mod clients;
 mod vehicle;
@@ -182,7 +183,8 @@ impl Control {
         let host = Instant::now();
         let (behind, since) = self.attention.look(host, self.ports.rounds())?;
         let before = self.clock.at(since);
-        // The present round may have begun before the end of the stall. Only the next one is sure to poll every socket.
+        // The network thread runs in rounds. Its present round may have begun before the end of the stall. Only the next one is
+        // sure to poll every socket.
         let handed_over = self.ports.rounds() + 2;
         while self.ports.rounds() < handed_over && host.elapsed() < HAND_OVER {
             std::thread::sleep(CYCLE / 5);

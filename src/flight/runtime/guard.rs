@@ -46,8 +46,8 @@ pub(super) struct Guard {
 }
 
 impl Guard {
-    /// Reads the key and the timestamp. The vehicle's link has id 0. The clients' links have ids from 1, in the order of
-    /// `options`.
+    /// Reads the key and the timestamp. The vehicle's link has id 0. The links to clients (ground stations and offboard programs)
+    /// have ids from 1, in the order of `options`.
     pub(super) fn open(signing: &Signing, options: &FlightOptions) -> Result<Self, SigningError> {
         let key = Key::load(&signing.key)?;
         let (file, stamp) = StampFile::open(&signing.key)?;

@@ -5,8 +5,8 @@
 //!                ── client channel ──►   │    ▲
 //!                ◄── frames to send ─────┘    └─ one plan a tick ─ planner thread (slow controllers)
 //! ```
-//! The control thread owns the pilot, the vehicle's session and the client server. The vehicle has priority: a client's
-//! packet is processed only when no state frame is queued.
+//! The control thread owns the pilot, the vehicle's session and the server for clients (ground stations and offboard programs).
+//! The vehicle has priority: a client's packet is processed only when no state frame is queued.
 
 mod clock;
 mod control;

@@ -1,4 +1,5 @@
-//! The links of a flight to the vehicle and to the clients, with the queues of arrived packets and with the signing of frames.
+//! The links of a flight to the vehicle and to the clients (ground stations and offboard programs), with the queues of arrived
+//! packets and with the signing of frames.
 
 use std::net::SocketAddr;
 

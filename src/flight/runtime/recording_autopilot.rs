@@ -1,4 +1,5 @@
-//! The pilot's interface for clients. It records the calls that change the pilot's state and reports each text as an event.
+//! The pilot's interface for clients (ground stations and offboard programs). It records the calls that change the pilot's state
+//! and reports each text as an event.
 
 use super::Event;
 use crate::pilot::Pilot;

@@ -19,7 +19,7 @@ pub struct Summary {
     pub duration_s: f64,
     /// Counters of the vehicle link.
     pub vehicle: VehicleCounts,
-    /// Counters of client traffic.
+    /// Counters of the traffic with clients, which are ground stations and offboard programs.
     pub clients: ClientCounts,
     /// Signing counters; `None` without signing.
     pub signing: Option<SigningCounts>,

@@ -4,7 +4,7 @@
 //! The prior's state rates F_p are linear in the trained coefficients. Over a short window, the change of the
 //! measured state less the integral of F_p along the measured path therefore gives a linear regression. A gradient
 //! through rollouts converges more slowly: a fast mode (the roll damping) settles within a rollout, and after that
-//! only ratios of coefficients are identifiable. \[GSFM26\] starts from the prior as given.
+//! only ratios of coefficients are identifiable. \[GSFM26\] (see `src/lib.rs`) starts from the prior as given.
 //!
 //! A standard deviation in the model's file defines the prior distribution of its coefficient. Poorly identifiable
 //! coefficients then stay near their value in the file. Coefficients without a standard deviation are estimated from
@@ -62,11 +62,13 @@ pub(super) enum Weighting {
     Alike,
 }
 
-/// Regression row of a window or a sample: the error of each channel in units of the state's characteristic scale x_c,
-/// and the derivatives of the prediction.
+/// Regression row of a window or a sample. Every value is divided by the characteristic scale x_c of the channel's state.
 pub(super) struct Row {
+    /// For each channel, the measured change of the state (window) or the residual's state rate (sample), less the value that
+    /// the present parameters predict.
     pub error: [f64; 6],
-    /// Derivatives with respect to the coordinates of the `Basis`, then with respect to the nuisance coefficients.
+    /// Derivatives of the predicted value with respect to each fitted parameter: the coordinates of the `Basis`, then the
+    /// nuisance coefficients.
     pub slopes: Vec<[f64; 6]>,
 }
 
@@ -79,7 +81,7 @@ impl Row {
     }
 }
 
-/// The fitted parameters: the coordinates of the coefficients, and the nuisance coefficients.
+/// The fitted parameters: the coordinates in which `basis` expresses the trained coefficients, and the nuisance coefficients.
 pub(super) struct Fit<'a> {
     pub basis: &'a Basis,
     /// The forces with nuisance terms: those on which no trained coefficient acts.
@@ -208,9 +210,9 @@ fn quadrature(integrator: Integrator, channel: usize, k: usize) -> f64 {
     }
 }
 
-/// The weighted least-squares step of the fitted parameters. `known` holds the information matrix of the prior distribution
-/// of the first parameters, and their deviation from the prior mean. `None` if there are no rows or the normal equations
-/// cannot be solved.
+/// The change of the fitted parameters that minimises the weighted sum of squared errors of `rows`. `known` describes the prior
+/// distribution of the first parameters by its information matrix, and by the deviation of their present values from the prior
+/// mean. `None` if there are no rows or the normal equations cannot be solved.
 pub(super) fn solve(
     rows: &[Row],
     count: usize,
@@ -229,7 +231,8 @@ pub(super) fn solve(
         let moved = rows.iter().map(|r| r.slopes.iter().map(|s| s[i] * s[i]).sum::<f64>());
         let size = (moved.sum::<f64>() / rows.len() as f64).sqrt();
         let deviation = (1.4826 * *median).max(FLOOR * size).max(f64::MIN_POSITIVE);
-        // with a prior, the weight of correlated windows is divided by their correlation length
+        // The errors of successive rows are correlated. If a prior distribution is stated, the weights are divided by the
+        // correlation length, so that the rows do not count as more information than they have.
         let said_by = match known {
             Some((information, _)) if information.iter().any(|x| *x != 0.0) => {
                 let errors = rows.iter().map(|r| r.error[i].clamp(-deviation, deviation));

@@ -1,6 +1,6 @@
 //! Writes the folder of a trained model. The model is the prior (the physical model) plus the residual, a neural network that
-//! learns the rest of the state rates. The files are `model.toml`, the airframe file, the prior's effect files and
-//! `residual.safetensors`.
+//! learns the rest of the state rates. The files are `model.toml`, the airframe file, the prior's effect files (formulas of
+//! forces and moments) and `residual.safetensors`.
 
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
-//! The objective over a minibatch of rollouts, eqs. (20) to (24) of \[GSFM26\], with its gradient.
+//! The objective over a minibatch of rollouts, eqs. (20) to (24) of \[GSFM26\] (see `src/lib.rs`), with its gradient.
 //!
-//! The trained model is a prior, which is a physical model, plus a residual network. A rollout simulates the model from a
-//! recorded state with the recorded controls. The objective penalises the prediction error and the size of the residual.
+//! The trained model (the subject) is a prior, which is a physical model, plus a residual network. A rollout simulates the model
+//! from a recorded state with the recorded controls. The objective penalises the prediction error and the size of the residual.
 
 use rayon::prelude::*;
 
@@ -15,14 +15,14 @@ use crate::dynamics::windows::{Track, Window};
 pub enum Penalty {
     /// The ratio ‖F_a‖/‖F_p‖ of the state rates of residual and prior, eq. (24).
     Ratio,
-    /// The norm ‖F_a‖, as in PhIHP and APHYNITY.
+    /// The norm ‖F_a‖ of the residual's state rates, as in the published methods PhIHP and APHYNITY.
     Absolute,
 }
 
 /// The training objective.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Objective {
-    /// Scale of errors and rates: x_c of eq. (21), or ones.
+    /// Scale of errors and rates: the characteristic scale x_c of each state, eq. (21), or ones.
     pub scale: [f64; 8],
     /// Penalty on the residual.
     pub penalty: Penalty,
@@ -75,7 +75,7 @@ impl Objective {
 }
 
 impl Gradient {
-    /// A zero gradient for `subject`.
+    /// A zero gradient, with an entry for each parameter of the network and of the prior of `subject`.
     pub fn zero(subject: &Subject) -> Gradient {
         Gradient {
             network: vec![0.0; subject.network.network().parameters().len()],

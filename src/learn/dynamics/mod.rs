@@ -1,5 +1,5 @@
 //! Learning a grey-box model from flights: the coefficients of its physical effects (the prior) and a network (the residual)
-//! together, section IV-A of \[GSFM26\] (T. Guerin et al., 2026).
+//! together, section IV-A of \[GSFM26\] (T. Guerin et al., 2026, see `src/lib.rs`).
 
 pub(super) mod basis;
 pub(super) mod engine;

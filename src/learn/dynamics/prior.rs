@@ -1,5 +1,6 @@
-//! The prior, the physical part of a model, at one point: state rates, and their derivatives with respect to the state and
-//! the coefficients. Most effects depend on the point alone. Dependent effects also use the forces of other effects.
+//! The prior, the physical part of a model, at one point: state rates, and their derivatives with respect to the state and the
+//! coefficients. An effect is a physical contribution to forces and moments. Most effects depend on the point alone. Dependent
+//! effects also use the forces of other effects.
 
 use crate::dynamics::packet::Packet;
 use greylag_model::{GreyBox, Starting, Weights, parted};

@@ -1,8 +1,8 @@
 //! Map of the learned residual: its magnitude in each channel and in each flight condition.
 //!
 //! The residual is the network that adds state rates F_a to the rates F_p of the physical effects (the prior). x_c is the
-//! reference scale of the state, eq. (21) of \[GSFM26\] (T. Guerin et al., 2026). A channel is one of the eight state rates. A
-//! regime variable describes the flight condition: angle of attack, sideslip or airspeed.
+//! reference scale of the state, eq. (21) of \[GSFM26\] (T. Guerin et al., 2026, see `src/lib.rs`). A channel is one of the eight
+//! state rates. A regime variable describes the flight condition: angle of attack, sideslip or airspeed.
 
 use rayon::prelude::*;
 use serde::Serialize;

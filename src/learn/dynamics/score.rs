@@ -9,7 +9,8 @@ use greylag_model::{GreyBox, Memory};
 /// Interval between the starts of consecutive runs along a track, steps of 10 ms.
 const EVERY: usize = 50;
 
-/// Limit of the error of a run, which is relative to the scale x_c of the states. A run at the limit counts as diverged.
+/// Limit of the error of a run, which is relative to the characteristic scale x_c of each state. A run at the limit counts as
+/// diverged.
 const BOUND: f64 = 1.0;
 
 /// The error at one horizon.

@@ -81,7 +81,7 @@ pub struct Window {
     pub track: u32,
     /// Index of the start sample in the track, at least 1.
     pub start: u32,
-    /// Weight in the loss; 1 in \[GSFM26\].
+    /// Weight in the loss; 1 in \[GSFM26\] (see `src/lib.rs`).
     pub weight: f64,
 }
 

@@ -1,8 +1,8 @@
 //! The learning curve of a policy: evaluations in its training environment, as a table on disk.
 //!
 //! An evaluation flies the policy to commanded attitudes, which are easy or hard targets by their size (Table II of \[GSFM26\],
-//! T. Guerin et al., 2026). The settled error of a target is the mean of the RMSE in roll and in pitch at the end of the
-//! flight.
+//! T. Guerin et al., 2026, see `src/lib.rs`). The settled error of a target is the mean of the RMSE in roll and in pitch at the
+//! end of the flight.
 
 use std::fs::File;
 use std::io::Write as _;

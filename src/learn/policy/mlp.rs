@@ -14,9 +14,9 @@ pub struct Mlp {
 
 /// The optimiser Adam for one network. It updates each tensor in a single pass.
 ///
-/// burn's Adam makes a dozen passes over each tensor, each with a new allocation. At the layer sizes of Table VII of \[GSFM26\],
-/// these passes take a tenth of the time of a TD3 update. This code uses burn's operations in burn's order. A test checks that
-/// the results are equal to the bit.
+/// burn's Adam makes a dozen passes over each tensor, each with a new allocation. At the layer sizes of Table VII of \[GSFM26\]
+/// (see `src/lib.rs`), these passes take a tenth of the time of a TD3 update. This code uses burn's operations in burn's order. A
+/// test checks that the results are equal to the bit.
 #[derive(Clone, Debug)]
 pub struct Optimiser {
     rate: f64,

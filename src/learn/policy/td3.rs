@@ -1,5 +1,6 @@
 //! The update of TD3 (twin delayed deep deterministic policy gradient, Fujimoto et al. 2018) with the values of Table VII of
-//! \[GSFM26\]. The actor is the network of the policy. The two critics estimate the return, the discounted sum of rewards.
+//! \[GSFM26\] (see `src/lib.rs`). The actor is the network of the policy. The two critics estimate the return, the discounted sum
+//! of rewards.
 //!
 //! Departures from the paper:
 //! - Observations are scaled, and contain attitude errors instead of commanded attitudes

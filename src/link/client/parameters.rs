@@ -1,4 +1,4 @@
-//! The MAVLink parameter protocol: clients list, read and set the companion's parameters.
+//! The MAVLink parameter protocol: clients (ground stations and offboard programs) list, read and set the companion's parameters.
 
 use super::{Clients, Now};
 use crate::autopilot::{Autopilot, Parameter, ParameterValue, Verdict};

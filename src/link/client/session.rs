@@ -1,4 +1,5 @@
-//! Session of one client: MAVLink version, sequence number, streams and parameter transfer.
+//! Session of one client (a ground station or an offboard program): MAVLink version, sequence number, streams and parameter
+//! transfer.
 
 use std::time::Duration;
 

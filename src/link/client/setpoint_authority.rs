@@ -1,4 +1,5 @@
-//! Decides which client's setpoints are accepted. One client at a time has this authority, until its setpoints stop.
+//! Decides which client's setpoints are accepted. A client is a ground station or an offboard program. One client at a time has
+//! this authority, until its setpoints stop.
 
 use std::time::Duration;
 

@@ -1,4 +1,5 @@
-//! Setpoints from clients. They are accepted, refused if they are invalid, or ignored if another client is in control.
+//! Setpoints from clients (ground stations and offboard programs). They are accepted, refused if they are invalid, or ignored if
+//! another client is in control.
 
 use super::{Clients, Now};
 use crate::autopilot::{AttitudeSetpoint, Autopilot, Sticks};

@@ -1,4 +1,5 @@
-//! Intervals of the streams that a client receives. A stream is a MAVLink message that is sent periodically.
+//! Intervals of the streams that a client (a ground station or an offboard program) receives. A stream is a MAVLink message that
+//! is sent periodically.
 //!
 //! [`STREAMS`] in `link/wire/telemetry.rs` lists the messages and their default rates.
 

@@ -16,7 +16,8 @@ pub enum Axis {
 pub enum Fault {
     /// The state of the aircraft is not usable for control.
     State,
-    /// A failsafe is active: the client's setpoints or the vehicle's state were lost.
+    /// A failsafe is active: the setpoints of the client (a ground station or an offboard program) or the vehicle's state were
+    /// lost.
     Lost,
     /// The aircraft's response to the surface has the opposite sign to that of the model.
     Reversed(Axis),

@@ -1,8 +1,9 @@
 //! The `px4` and `ardupilot` profiles: the vehicle is a real flight controller, whose decisions have priority.
 //!
 //! In this module "controller" means the flight controller, and "stack" its software, PX4 or ArduPilot. The controller flies
-//! until a client requests that the companion flies (engagement). The companion then commands the controller through the
-//! interface of its stack (see `profile`). At the first fault the companion returns control authority.
+//! until a client (a ground station or an offboard program) requests that the companion flies (engagement). The companion then
+//! commands the controller through the interface of its stack (see `profile`). At the first fault the companion returns control
+//! authority.
 
 pub mod air_data;
 mod assembly;

@@ -1,5 +1,5 @@
-//! The `sitl` profile: the link to the simulator `greylag-sitl`. Its shim, the simulator's MAVLink side, sends the vehicle's
-//! state as five messages, a state frame. The companion answers each state frame with one command message.
+//! The vehicle link to the simulator `greylag-sitl` (profile `sitl`). The shim, the simulator's MAVLink side, sends each state of
+//! the vehicle as five messages (a state frame). The companion (Greylag's autopilot) answers each with one command message.
 
 use std::time::Duration;
 

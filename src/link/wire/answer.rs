@@ -1,4 +1,4 @@
-//! MAVLink messages that reply to requests of clients.
+//! MAVLink messages that reply to requests of clients (ground stations and offboard programs).
 
 use mavlink::dialects::ardupilotmega::{
     AUTOPILOT_VERSION_DATA, FILE_TRANSFER_PROTOCOL_DATA, HOME_POSITION_DATA, MESSAGE_INTERVAL_DATA,

@@ -17,9 +17,10 @@ pub const SET_MODE: u16 = 176;
 /// Command number of MAV_CMD_SET_MESSAGE_INTERVAL.
 pub const SET_MESSAGE_INTERVAL: u16 = 511;
 
-/// Assumed standard deviations of the wind in WIND_COV (PX4) and in WIND (ArduPlane), m/s. PX4's wind had an error of 0.1 m/s
-/// in calm air. ArduPlane's wind is sent at 2 Hz and drifts by 0.9 m/s: with an assumed 0.5 m/s the estimated sideslip had a
-/// standard error of 1.3°, with 4 m/s 0.3° (`tests/firmware/angles.py`).
+/// Assumed standard deviations of the wind in WIND_COV (PX4) and in WIND (ArduPlane), m/s. In still air, ArduPlane's wind was
+/// wrong by up to 0.9 m/s. The companion uses the wind to estimate the sideslip. With 0.5 m/s for ArduPlane, the estimate had an
+/// error of 1.3°, with 4 m/s of 0.34° to 0.50° in trial flights (`results/notes/2026-11-27-real-firmware.md`).
+/// `tests/firmware/angles.py` prints these errors for a recording.
 const WIND_COV_SD: f64 = 0.5;
 const WIND_SD: f64 = 4.0;
 
@@ -55,7 +56,7 @@ pub enum ControllerMessage {
     },
     /// Airspeed, altitude and climb rate from VFR_HUD.
     Air {
-        /// Equivalent airspeed, m/s; PX4 reports calibrated airspeed.
+        /// Equivalent airspeed, m/s. PX4 reports calibrated airspeed, which is used as equivalent airspeed without correction.
         airspeed: f64,
         /// Altitude above mean sea level, m.
         altitude: f64,

@@ -48,8 +48,8 @@ pub fn from_set_mode(base: u8, custom: u32) -> ModeRequest {
     }
 }
 
-/// The mode that a DO_SET_MODE requests. PX4's clients send the main mode and the sub mode in two parameters. Other clients send
-/// the whole `custom_mode` in the first of these. NaN counts as zero.
+/// The mode that a DO_SET_MODE requests. Clients of PX4 (ground stations and scripts) send the main mode and the sub mode in two
+/// parameters. Other clients send the whole `custom_mode` in the first of these. NaN counts as zero.
 pub fn from_do_set_mode(base: f64, main: f64, sub: f64) -> ModeRequest {
     let base = base as u32 as u8;
     match base & CUSTOM {

@@ -1,4 +1,4 @@
-//! Requests of clients, decoded from MAVLink frames.
+//! Requests of clients (ground stations and offboard programs), decoded from MAVLink frames.
 
 use mavlink::dialects::ardupilotmega::MavMessage;
 

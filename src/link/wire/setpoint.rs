@@ -1,4 +1,4 @@
-//! Decoding and validation of attitude setpoints and stick positions from clients.
+//! Decoding and validation of attitude setpoints and stick positions from clients (ground stations and offboard programs).
 
 use mavlink::dialects::ardupilotmega::{MANUAL_CONTROL_DATA, SET_ATTITUDE_TARGET_DATA};
 

@@ -1,9 +1,9 @@
 //! Registry of the effects that are defined by effect files (TOML): effects of shipped files, and effects of files that this
-//! process has read.
+//! process has read. An effect is one physical contribution to the forces and moments of a model.
 //!
-//! These effects are found by their ids, like the effects of the catalogue. An effect that was read is kept until the process
-//! ends. If its file is read again unchanged, the same effect is returned. If the file was edited in between, [`find`] returns
-//! the new effect from then on, and models that were loaded before keep the earlier effect.
+//! These effects are found by their ids, like the effects that are compiled into the program. An effect that was read is kept
+//! until the process ends. If its file is read again unchanged, the same effect is returned. If the file was edited in between,
+//! [`find`] returns the new effect from then on, and models that were loaded before keep the earlier effect.
 
 use std::path::{Path, PathBuf};
 use std::sync::{LazyLock, PoisonError, RwLock};

@@ -1,8 +1,8 @@
 //! Amends a model with flights: re-estimates ("tunes") its coefficients, then adds effects that improve the prediction of
 //! held-out flights, which are not fitted.
 //!
-//! An effect is a group of model terms with its coefficients, from the catalogue or from an effect file. A free run is an
-//! open-loop simulation of the model along a recorded flight. Its horizon is its duration.
+//! An effect is a group of model terms with its coefficients, from the catalogue (the effects that the program knows) or from an
+//! effect file. A free run is an open-loop simulation of the model along a recorded flight. Its horizon is its duration.
 
 mod installation;
 mod selection;

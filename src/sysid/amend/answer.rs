@@ -1,6 +1,6 @@
-//! Short answers (summaries) of an amendment, of a diagnosis, and of a comparison of models before and after an amendment.
-//! An amendment re-estimates ("tunes") the coefficients of a model and adds effects that it lacks. A diagnosis finds these
-//! effects. Errors are those of free runs, simulations from recorded states.
+//! Short answers (summaries) of an amendment, of a diagnosis, and of a comparison of models before and after an amendment. An
+//! amendment re-estimates ("tunes") the coefficients of a model and adds effects (physical contributions to forces and moments)
+//! that it lacks. A diagnosis finds these effects. Errors are those of free runs, simulations from recorded states.
 
 use std::path::{Path, PathBuf};
 

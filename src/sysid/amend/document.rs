@@ -1,6 +1,6 @@
 //! Files of an amendment: the new text of the model file, and the result as JSON.
 //!
-//! An amendment refits a model to logs and adds effects that it lacked.
+//! An amendment refits a model to logs and adds effects (physical contributions to forces and moments) that it lacked.
 
 use std::path::{Path, PathBuf};
 
@@ -128,7 +128,7 @@ impl Original {
 }
 
 /// Name and text of each file of an amended model: airframe, effects, model, result. `logs` are the fitted logs, `hold_out` the
-/// held-out ones.
+/// held-out ones, which the fit did not use.
 ///
 /// # Errors
 /// If the original is no model file, if the model has a learned residual, if the result holds a number that JSON cannot

@@ -37,9 +37,9 @@ pub(super) fn start(model: &GreyBox, free: &[Free], flights: &[Flight]) -> Vec<f
     search(model, free, flights, theta, ITERATIONS).1
 }
 
-/// Starting points of the search: the prior means, with every combination of the catalogue's starting values for the shape
-/// constants of added effects. Shape constants are the coefficients in which an effect is nonlinear. A constant that would lead
-/// to more than [`MOST_STARTS`] combinations keeps its prior mean.
+/// Starting points of the search: the prior means, with every combination of the starting values that the catalogue of known
+/// effects states for the shape constants of added effects. Shape constants are the coefficients in which an effect is nonlinear.
+/// A constant that would lead to more than [`MOST_STARTS`] combinations keeps its prior mean.
 fn starts(free: &[Free]) -> Vec<Vec<f64>> {
     let mut starts: Vec<Vec<f64>> = vec![free.iter().map(|f| f.prior).collect()];
     for (k, f) in free.iter().enumerate().filter(|(_, f)| f.added && !f.linear) {

@@ -1,4 +1,5 @@
-//! Errors of an amendment: of the fit of a model to flights, and of the addition of effects to the model.
+//! Errors of an amendment: of the fit of a model to flights, and of the addition of effects (physical contributions to forces and
+//! moments) to the model.
 
 use crate::progress::Cancelled;
 use crate::weak_form::prepared::ClockError;

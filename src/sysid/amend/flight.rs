@@ -6,7 +6,7 @@ use crate::per_flight::trims::TRIMS;
 use crate::per_flight::{PerFlight, askew};
 use crate::weak_form::prepared::{ClockError, Prepared};
 
-/// Number of sensor constants estimated for each flight.
+/// Number of sensor constants (remaining sensor errors, delay and blur of the actuator record) estimated for each flight.
 pub(super) const SENSORS: usize = 8;
 /// Index of the actuators' delay (s) among the sensor constants.
 pub(super) const SKEW: usize = 0;

@@ -1,7 +1,7 @@
 //! Selection of a model's structure by leave-one-out cross-validation: each flight is predicted by a fit to all other flights.
 //!
-//! A structure states which coefficients are fitted and which effects are added. The error of a flight is the NRMSE of free
-//! runs (open-loop simulations from measured states).
+//! A structure states which coefficients are fitted and which effects (physical contributions to forces and moments) are added.
+//! The error of a flight is the NRMSE of free runs (open-loop simulations from measured states).
 
 use rayon::prelude::*;
 use serde::Serialize;

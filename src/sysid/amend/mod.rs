@@ -1,4 +1,4 @@
-//! Refits a model to flights by output error and adds effects to it.
+//! Refits a model to flights by output error and adds effects (physical contributions to forces and moments) to it.
 //!
 //! The method is described in `docs/explanation/diagnosis.md`. An equation-error fit provides starting values of the
 //! coefficients. An output-error fit by multiple shooting (simulations of short segments) refines them. Held-out flights, which

@@ -45,7 +45,8 @@ const START: [f64; 8] = [3e-3, 3e-3, 0.15, 5e-3, 5e-3, 5e-3, 3e-3, 3e-3];
 /// Options of a fit.
 #[derive(Clone, Debug)]
 pub struct FitOptions {
-    /// Identifiers of the added effects in the model. Their coefficients have only their bounds as a prior.
+    /// Identifiers of the added effects (physical contributions to forces and moments) in the model. Their coefficients have only
+    /// their bounds as a prior.
     pub added: Vec<String>,
     /// Lengths of the shots, s. The fit uses one length after the other.
     pub lengths_s: Vec<f64>,
@@ -69,7 +70,7 @@ pub struct Fit {
     pub model: GreyBox,
     /// The coefficients that were free.
     pub parameters: Vec<Parameter>,
-    /// Estimated constants of each flight.
+    /// Estimated constants of each flight: sensor errors, and misalignment angles and trims if asked for.
     pub flights: Vec<FittedFlight>,
     /// Standard deviations of the residuals, in the order and the units of the state.
     pub residual_sd: [f64; 8],

@@ -1,7 +1,7 @@
 //! The free coefficients of a fit, with their priors, bounds and finite-difference steps.
 //!
-//! Shape constants are coefficients in which the model is nonlinear. A curve is an effect that is given by ordinates instead of
-//! a formula.
+//! Shape constants are coefficients in which the model is nonlinear. A curve is an effect (a physical contribution to forces and
+//! moments) that is given by ordinates instead of a formula.
 
 use greylag_model::{GreyBox, Named};
 use greylag_physics::catalogue;

@@ -1,5 +1,5 @@
-//! Parts of the complete refit: an output-error fit without added effects, and a fast equation-error estimate with added
-//! effects.
+//! Parts of the complete refit: an output-error fit without added effects, and a fast equation-error estimate with added effects
+//! (physical contributions to forces and moments).
 
 use rayon::prelude::*;
 

@@ -1,7 +1,8 @@
 //! The result of an amendment, serialised to JSON (`greylag.amend/1`).
 //!
-//! An amendment re-estimates ("tunes") a model's coefficients from flights and adds effects. Its errors are those of free runs
-//! (open-loop simulations) along held-out flights, which are not fitted. The horizon of a free run is its duration.
+//! An amendment re-estimates ("tunes") a model's coefficients from flights and adds effects (physical contributions to forces and
+//! moments). Its errors are those of free runs (open-loop simulations) along held-out flights, which are not fitted. The horizon
+//! of a free run is its duration.
 
 use serde::Serialize;
 

@@ -10,8 +10,8 @@ use greylag_logs::Sampling;
 use greylag_model::{GreyBox, Memory};
 use greylag_physics::{Controls, State};
 
-/// A run has diverged once its scaled error exceeds this bound. The scaled error is the root mean square over the states of
-/// error / x_c, with the reference scales x_c of the states.
+/// A run has diverged once its scaled error exceeds this bound. The scaled error is the root mean square, over the states, of the
+/// error divided by x_c, the characteristic scale of the state.
 const LEFT: f64 = 0.7;
 /// Shortest shot that is fitted, s.
 pub(super) const SHORTEST_S: f64 = 0.4;

@@ -2,9 +2,9 @@
 //!
 //! A channel is a force, a moment or a rate. A window is a short section of a flight over which it is averaged with a kernel.
 //!
-//! The error of an estimated sensor bias shifts the residuals of all windows of a flight equally. A bootstrap over windows
-//! does not cover this shift. The sensor constants are treated as independent, with the standard deviations that the
-//! reconstruction states.
+//! The error of an estimated sensor bias shifts the residuals of all windows of a flight equally. A bootstrap over windows does
+//! not cover this shift. The sensor constants (biases, scales, delays) are treated as independent, with the standard deviations
+//! that the reconstruction states.
 
 use crate::flight_path::reconstruction::{Instant, Nuisance};
 use crate::weak_form::channels::ChannelId;

@@ -85,8 +85,8 @@ pub struct ModelResult {
     pub sentences: Vec<String>,
     /// Free-run error at each horizon.
     pub free_run: Vec<HorizonScore>,
-    /// Flights for which `free_run` uses constants in the model's file, and the errors without these constants; `None` if
-    /// the file has no constants for these flights.
+    /// Flights for which `free_run` uses constants (sensor errors, trims) in the model's file, and the errors without these
+    /// constants; `None` if the file has no constants for these flights.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub known: Option<KnownUse>,
     /// Growth of the free-run error with time, from the start to the longest horizon.
@@ -257,9 +257,9 @@ pub struct Bin {
     /// 95 % interval of the mean: block bootstrap, widened by the uncertainty of the sensor errors estimated by the
     /// reconstruction.
     pub interval: [f64; 2],
-    /// Benjamini–Hochberg q-value, 0..1: expected fraction of false discoveries among the cells of the model that are at
-    /// least as significant as this cell. NaN if the bin is not supported. The model fails in cells with a q-value of at
-    /// most 0.05.
+    /// Benjamini–Hochberg q-value, 0..1: expected fraction of false discoveries among the cells of the model that are at least as
+    /// significant as this one. A cell is one channel in one bin. NaN if the bin is not supported. The model fails in cells with
+    /// a q-value of at most 0.05.
     pub q_value: f64,
     /// Mean of the measured channel, in its unit.
     pub measured: f64,

@@ -1,4 +1,4 @@
-//! Errors of a diagnosis, which searches for effects that a model lacks.
+//! Errors of a diagnosis, which searches for effects (physical contributions to forces and moments) that a model lacks.
 
 use crate::progress::Cancelled;
 use crate::weak_form::prepared::ClockError;
@@ -41,7 +41,7 @@ pub enum DiagnoseError {
         /// Name of the model.
         model: String,
     },
-    /// The user adds an unknown effect to the candidates, or excludes an unknown one.
+    /// The user adds an unknown effect to the candidates (the effects to be tested), or excludes an unknown one.
     #[error(
         "cannot try or leave out effect {id:?}: it is unknown; `greylag effects list` names those there are"
     )]

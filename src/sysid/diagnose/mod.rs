@@ -1,6 +1,6 @@
-//! Diagnosis of a model: finds the physical effects that it lacks. Candidate effects are ranked by their evidence, which must
-//! exceed a critical value. The critical value is determined by bootstrap draws under the null hypothesis that no effect is
-//! missing.
+//! Diagnosis of a model: finds the physical effects (contributions to forces and moments) that it lacks. The candidates, which
+//! are effects that it may lack, are ranked by their evidence, which must exceed a critical value. The critical value is
+//! determined by bootstrap draws under the null hypothesis that no effect is missing.
 //!
 //! The method is described in `docs/explanation/diagnosis.md`. Flights must be reconstructed with their deflections as recorded
 //! ([`ActuatorClock::AsRecorded`](crate::flight_path::ActuatorClock)), because the diagnosis itself separates delays of the

@@ -1,5 +1,5 @@
-//! Options of a diagnosis, the search for effects that a model lacks. A candidate is an effect that the model may lack. An effect
-//! is asserted if the diagnosis states that the model lacks it.
+//! Options of a diagnosis, the search for effects (physical contributions to forces and moments) that a model lacks. A candidate
+//! is an effect that the model may lack. An effect is asserted if the diagnosis states that the model lacks it.
 
 use crate::per_flight::PerFlight;
 
@@ -25,7 +25,8 @@ pub struct Options {
     pub bootstraps: usize,
     /// Significance level: probability that any effect is asserted if no effect is missing.
     pub level: f64,
-    /// Identifiers of effects from effect files that are candidates in addition to the catalogue.
+    /// Identifiers of effects from effect files that are candidates in addition to the catalogue (the effects that the program
+    /// knows).
     pub with: Vec<String>,
     /// Identifiers of effects of the catalogue that are not candidates.
     pub without: Vec<String>,

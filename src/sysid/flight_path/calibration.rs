@@ -1,10 +1,11 @@
-//! Rare instrument errors: each error is estimated only if a flight shows it significantly.
+//! Rare instrument errors: the prior distribution of such an error is wide only if a flight shows the error significantly.
 //!
-//! Rare errors are gains of gyros, accelerometers and vanes, an offset of airspeed or heading, and a delay of many samples.
-//! If all of them were free, the biases would be less certain in every flight. Each error is therefore held at its prior
-//! mean at first. It is freed if the data contradict this value: its estimate without the prior differs from the prior mean
-//! significantly and by a relevant size. This is a score test with the path and all other constants fitted (Klein and
-//! Morelli, Aircraft System Identification, section 5.3.3).
+//! Rare errors are gains of gyros, accelerometers and vanes, an offset of airspeed or heading, and a delay of many samples. If
+//! all of them had wide priors, the biases would be less certain in every flight. At first, gains and offsets are therefore held
+//! at their prior means, and delays are estimated with a narrow prior. An error is freed, which means that it gets a wide prior,
+//! if the data contradict its prior mean: its estimate without its prior differs from the prior mean significantly and by a
+//! relevant size. This is a score test with the path and all other constants (sensor errors, wind, Earth's rate) fitted (Klein
+//! and Morelli, Aircraft System Identification, section 5.3.3).
 
 use crate::flight_path::equations::{Found, Problem};
 use crate::flight_path::nuisance::{
@@ -23,10 +24,11 @@ const ASKEW: f64 = 1.5 * std::f64::consts::PI / 180.0;
 const UNUSUAL: f64 = 4.0;
 /// Smallest relevant delay, s.
 const DELAY: f64 = 0.02;
-/// A constant is freed only if its standard deviation is below this fraction of its new prior standard deviation.
+/// An error is freed only if the standard deviation of its estimate without its prior is below this fraction of the standard
+/// deviation of its wide prior. The flight then determines the error better than the wide prior does.
 const KNOWN: f64 = 0.25;
 
-/// Index of the next constant to free, and its new prior standard deviation. `None` if no other constant is significant.
+/// Index of the next constant to free, and the standard deviation of its wide prior. `None` if no other constant is significant.
 ///
 /// `bound` is the residual, in standard deviations, beyond which a measurement is down-weighted.
 pub fn next(problem: &Problem, found: &Found, bound: f64) -> Option<(usize, f64)> {

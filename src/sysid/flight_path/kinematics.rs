@@ -49,8 +49,8 @@ pub struct Step<const N: usize, const D: usize> {
     pub first: Block<N>,
     /// Derivatives with respect to the second sample.
     pub second: Block<N>,
-    /// Derivatives with respect to the constants that act between samples, and the negated difference in the last column.
-    /// These columns are the last `D` columns of the equations.
+    /// `D` columns. The last one is the negated difference. Those before it are the derivatives with respect to the constants
+    /// that act between samples: errors of gyros and accelerometers, and the Earth's rate. With `D` = 1 there are none.
     pub rest: Wide<N, D>,
 }
 
@@ -115,7 +115,7 @@ impl Drive {
 
     /// The step from sample `k` to the next sample, linearised at `path`.
     ///
-    /// The gust decays with the time constant [`GUST_TIME`]. With `D` = 1 there are no derivatives with respect to constants.
+    /// The gust decays with the time constant [`GUST_TIME`].
     pub fn step<const N: usize, const D: usize>(
         &self,
         path: &Path,

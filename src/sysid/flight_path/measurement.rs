@@ -1,6 +1,7 @@
 //! Measurement equations of the flight-path reconstruction: sensor values predicted from the estimated path and the sensors'
-//! errors. A constant acts at instants if it changes a predicted value directly, as the bias of a vane does. The biases of
-//! gyros and accelerometers instead act through the integration of the path.
+//! errors. The constants of a flight are its sensor errors and its wind. A constant acts at instants if it changes a predicted
+//! value directly, as the bias of a vane does. The biases of gyros and accelerometers instead act through the integration of the
+//! path.
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;

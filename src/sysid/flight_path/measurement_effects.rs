@@ -1,4 +1,5 @@
-//! Catalogue entries for measurement errors, and for wind, that may look like an effect that a model lacks.
+//! Catalogue entries for measurement errors, and for wind, that may look like an effect (a physical contribution to forces and
+//! moments) that a model lacks. The catalogue lists what may explain the errors of a model.
 //!
 //! The flight-path reconstruction estimates these errors from kinematics alone, without aerodynamics. The coefficients of the
 //! entries are the [constants](crate::flight_path) that it estimates, with the same names.

@@ -1,4 +1,5 @@
-//! Flight-path reconstruction (data compatibility check): estimates states, sensor errors and wind of a logged flight.
+//! Flight-path reconstruction (data compatibility check): estimates states, sensor errors and wind of a logged flight. The sensor
+//! errors and the steady wind are called the constants of the flight.
 //!
 //! It uses only kinematic equations, which contain no aerodynamics. No aerodynamic model of the aircraft is therefore needed.
 

@@ -59,7 +59,7 @@ impl Nuisance {
     }
 }
 
-/// A reconstructed flight with its estimated constants and noise.
+/// A reconstructed flight with its estimated constants (sensor errors, wind) and noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reconstruction {
     /// Name of the flight in reports, from its file.

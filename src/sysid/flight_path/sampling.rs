@@ -30,7 +30,7 @@ const DEVIATIONS: f64 = 3.0;
 pub struct Chosen {
     /// Meaning of a rate sample.
     pub sampling: Sampling,
-    /// Estimated path and constants.
+    /// Estimated path and constants (sensor errors, wind).
     pub found: Found,
     /// Note with the reason, if the rates were found to be held.
     pub note: Option<String>,

@@ -30,7 +30,8 @@ pub struct PerFlight {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SensorErrors {
-    /// They become errors of the installation if the error of the held-out flights then decreases by more than 1 %.
+    /// They become errors of the installation if the error of the held-out flights, which are not fitted, then decreases by more
+    /// than 1 %.
     #[default]
     Judged,
     /// They become errors of the installation unless the error of the held-out flights then increases.

@@ -1,8 +1,8 @@
 //! Trims of a flight: constants that are added to the force and moment coefficients of a model, and a relative change of the
 //! thrust. They differ between flights of one aircraft, for example because of its loading.
 //!
-//! The trims are added to a model as an effect (a group of terms) that is not in the catalogue. The model need not have
-//! coefficients with these names.
+//! The trims are added to a model as an effect (a group of terms) that is not in the catalogue of effects to be searched for. The
+//! model need not have coefficients with these names.
 
 use greylag_model::{GreyBox, JoinError};
 use greylag_physics::formula::register;

@@ -21,8 +21,8 @@ pub(super) fn line(p: &Progress, trainer: &Trainer, ms: f64) -> String {
     text
 }
 
-/// Table of the state rates, one row each: RMS of the prior's rate and of the learned residual's rate, and the flight
-/// condition in which the residual is strongest.
+/// Table of the state rates, one row each: RMS of the rate from the prior (the physical model) and of the rate from the learned
+/// residual, and the flight condition in which the residual is strongest.
 pub(super) fn shares(residual_map: &ResidualMap) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);

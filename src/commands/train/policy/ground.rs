@@ -20,8 +20,9 @@ pub(super) struct Ground {
 }
 
 impl Ground {
-    /// Scores `actor` in the environment of its training, on a tenth of the easy and hard-corner attitudes of a target file. A
-    /// policy that is trained in a model is therefore chosen without flights in JSBSim.
+    /// Scores `actor` in the environment of its training, on a tenth of the easy and hard-corner attitudes (45° to 60° of roll
+    /// with 25° to 30° of pitch) of a target file. A policy that is trained in a model is therefore chosen without flights in
+    /// JSBSim.
     pub(super) fn evaluate(&self, actor: Arc<Actor>) -> Result<Evaluated> {
         let mut rows = TargetFile::generate(JUDGE_SEED).rows;
         rows.retain(|r| r.group != Group::HardOutside && r.number % 10 == r.number / 10 % 10);

@@ -36,7 +36,7 @@ impl Control {
     pub(super) fn take_vehicles(&mut self, arrival: Option<Arrival>, live: Option<Time>) {
         let mut newest = arrival.and_then(|arrival| self.take_vehicle(arrival, None));
         if self.clock.pace() == Pace::RealTime {
-            // arrivals after this moment are handled in the next round
+            // arrivals after this moment are handled in the next round of the loop
             for _ in 0..self.ports.from_vehicle.len() {
                 let Ok(arrival) = self.ports.from_vehicle.try_recv() else { break };
                 newest = self.take_vehicle(arrival, newest);

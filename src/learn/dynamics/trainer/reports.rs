@@ -1,6 +1,7 @@
 //! Reports of the training of a dynamics model: errors, progress and trained coefficients.
 //!
-//! The model is a prior (a physical model) plus a residual network. The numbers of equations refer to \[GSFM26\].
+//! The model is a prior (a physical model) plus a residual network. The numbers of equations refer to \[GSFM26\] (see
+//! `src/lib.rs`).
 
 use serde::{Deserialize, Serialize};
 

@@ -16,8 +16,8 @@ use crate::dynamics::windows::{Track, Window, windows};
 use greylag_model::GreyBox;
 use greylag_num::stream;
 
-/// Largest number of windows from which the prior's loss, L_prior of eq. (23) of \[GSFM26\] (T. Guerin et al., 2026), is
-/// computed.
+/// Largest number of windows from which the prior's loss, L_prior of eq. (23) of \[GSFM26\] (T. Guerin et al., 2026, see
+/// `src/lib.rs`), is computed.
 const PRIOR_WINDOWS: usize = 4096;
 const SHUFFLE: u64 = 2;
 

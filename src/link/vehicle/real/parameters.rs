@@ -16,8 +16,8 @@ const TRIES: u32 = 5;
 /// Valid pulse widths of a channel, µs.
 pub(super) const PULSE: std::ops::RangeInclusive<f64> = 800.0..=2200.0;
 
-/// Longest text about violations, characters. With its introduction it fits into the longest text that is sent to a
-/// client.
+/// Longest text about violations, characters. With its introduction it fits into the longest text that is sent to a client, for
+/// example a ground station.
 const LONGEST: usize = 330;
 
 /// A rule, and what is known about its parameter.

@@ -1,5 +1,5 @@
 //! Results of a finished output-error fit: estimates with their intervals, estimates from each flight alone, constants of each
-//! flight, and notes for the user.
+//! flight (sensor errors, misalignment angles, trims), and notes for the user.
 
 use std::sync::Arc;
 

@@ -19,7 +19,8 @@ pub(super) struct System {
 }
 
 impl Search<'_> {
-    /// Deviations of the unknowns at `place` from their prior means: free coefficients, then the constants of each flight.
+    /// Deviations of the unknowns at `place` from their prior means: free coefficients, then the constants of each flight (sensor
+    /// errors, misalignment angles, trims).
     pub(super) fn unknowns(&self, place: &Place) -> DVector<f64> {
         let coefficients = self.free.iter().zip(&place.theta).map(|(f, x)| x - f.prior);
         let mut all: Vec<f64> = coefficients.collect();

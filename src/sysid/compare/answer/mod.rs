@@ -1,5 +1,6 @@
-//! Short answer (summary) of a comparison, a diagnosis or an amendment: change of the prediction error, added effects, and
-//! largest remaining error. Terminal, web page, workbench and JSON all show this answer.
+//! Short answer (summary) of a comparison, a diagnosis or an amendment: change of the prediction error, added effects (physical
+//! contributions to forces and moments), and largest remaining error. Terminal, web page, workbench and JSON all show this
+//! answer.
 //!
 //! The prediction error is that of free runs: simulations of the model with the recorded controls.
 

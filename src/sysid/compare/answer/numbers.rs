@@ -1,4 +1,5 @@
-//! Numbers of an answer, which is the summary of a comparison: errors, their changes, coefficients of the added effects.
+//! Numbers of an answer, which is the summary of a comparison: errors, their changes, coefficients of the added effects (physical
+//! contributions to forces and moments).
 //!
 //! Errors are those of free runs (open-loop simulations from measured states). The models form a sequence: the given model,
 //! then models derived from it or compared with it.
@@ -32,7 +33,8 @@ pub struct Step {
     pub way: Way,
     /// Name of the model.
     pub model: String,
-    /// Free-run error at the horizon of the answer: NRMSE, the root mean square over runs and states of error / x_c.
+    /// Free-run error at the horizon of the answer: NRMSE, the root mean square over runs and states of error / x_c. x_c is the
+    /// characteristic scale of the state.
     pub error: f64,
     /// Change of `error` relative to the step before, %; relative to the first step for `Way::Other`. `None` for the first
     /// step.

@@ -84,7 +84,8 @@ fn beside_baseline(n: &Numbers, error: f64) -> String {
     format!("{text}, {beside} the best forecast without aerodynamics ({}), {best}", b.name)
 }
 
-/// Sentences on each added effect with its most significant coefficient, and on the state whose prediction improves most.
+/// Sentences on each added effect (a physical contribution to forces and moments) with its most significant coefficient, and on
+/// the state whose prediction improves most.
 pub fn effect(n: &Numbers) -> String {
     let mut said: Vec<String> = n.effects.iter().map(one).collect();
     let subject = match (n.steps.len(), n.effects.len()) {

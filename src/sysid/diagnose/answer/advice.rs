@@ -1,7 +1,7 @@
 //! Advice on the manoeuvres of the next flight, from the result of a diagnosis.
 //!
-//! The evidence of a candidate effect is its test statistic. A candidate whose evidence exceeds its threshold may be asserted
-//! as missing in the model.
+//! A candidate is an effect (a physical contribution to forces and moments) that the model may lack. Its evidence is its test
+//! statistic. A candidate whose evidence exceeds its threshold may be asserted as missing in the model.
 
 use crate::diagnose::answer::result::{Advice, Candidate, ChannelLeft, Verdict};
 use crate::diagnose::answer::sentences::figures;

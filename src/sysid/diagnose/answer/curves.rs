@@ -19,8 +19,8 @@ const NOT_SHOWN: [RegimeVariable; 3] =
 /// Computes the curve of an effect in the first of `channels`. `contribution` holds the effect's contribution in each window of
 /// each flight.
 ///
-/// `relative` is the standard deviation of the contribution relative to its value. `left` states whether the residual of the
-/// round still contains the contribution. `None` if there is no channel or no window.
+/// `relative` is the standard deviation of the contribution relative to its value. `left` states whether the residual of `round`,
+/// a linearisation of the model over the flights, still contains the contribution. `None` if there is no channel or no window.
 pub fn curve(
     round: &Round,
     contribution: &[Column],

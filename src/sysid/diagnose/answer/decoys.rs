@@ -1,6 +1,6 @@
 //! Placebo regressors (decoys), which check a diagnosis for false detections. They are made from the regressors of candidates
-//! (effects that the model may lack), by reversal in time or by randomised phases. They cannot be effects, so they should have
-//! little evidence.
+//! (physical effects that the model may lack), by reversal in time or by randomised phases. They cannot be effects, so they
+//! should have little evidence.
 
 use std::f64::consts::TAU;
 
@@ -23,8 +23,8 @@ const MOST: usize = 6;
 /// Longer series are divided, to limit the cost of the Fourier transform.
 const PIECE: usize = 256;
 
-/// Makes placebo regressors from the best candidates in the last round of the search, and computes their evidence. Only
-/// candidates with a single coefficient are used.
+/// Makes placebo regressors from the best candidates in the last round of the search (the last linearisation of the model), and
+/// computes their evidence. Only candidates with a single coefficient are used.
 pub fn decoys(found: &Found, seed: u64) -> Vec<Decoy> {
     let round = found.round();
     let mut random = stream(seed, &[DECOYS]);

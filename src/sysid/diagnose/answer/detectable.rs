@@ -1,5 +1,5 @@
-//! Minimum detectable effect: the smallest amount of each effect that the flights would show. Evidence is the test statistic
-//! of an effect.
+//! Minimum detectable effect: the smallest amount of each effect (a physical contribution to forces and moments) that the flights
+//! would show. Evidence is the test statistic of an effect.
 //!
 //! For an effect that is linear in its coefficients, this amount follows from the standard deviations of the
 //! coefficients. The contribution of an input effect is not proportional to its amount near zero: a small lag is
@@ -28,8 +28,9 @@ const POWERS: [f64; 2] = [0.5, 4.0];
 /// The search ends if the ratio of the evidence to the required evidence differs from 1 by less than this value.
 const CLOSE: f64 = 0.1;
 
-/// Smallest detectable amounts of the candidates of `round`, by identifier. The amount is that of the first free
-/// coefficient, in its unit. An effect of this amount has evidence above `threshold` with a probability of five in six.
+/// Smallest detectable amounts of the candidates (effects that the model may lack) of `round`, by identifier. The amount is that
+/// of the first free coefficient, in its unit. An effect of this amount has evidence above `threshold` with a probability of five
+/// in six.
 ///
 /// Candidates without a detectable amount are left out.
 pub fn detectable(round: &Round, threshold: f64) -> BTreeMap<&'static str, f64> {

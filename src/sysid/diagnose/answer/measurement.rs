@@ -4,9 +4,9 @@
 use crate::diagnose::answer::result::Measurement;
 use crate::flight_path::reconstruction::{Nuisance, Reconstruction};
 
-/// Kinds of estimated constants, each with the prefix of its name, its identifier in the catalogue, its nominal value, and
-/// the largest negligible deviation from that value, in the constant's unit. Errors of the reconstruction and usual trims
-/// cause deviations of this size.
+/// Kinds of estimated constants (sensor errors, wind), each with the prefix of its name, its identifier in the catalogue of
+/// effects and measurement errors, its nominal value, and the largest negligible deviation from that value, in the constant's
+/// unit. Errors of the reconstruction and usual trims cause deviations of this size.
 const KINDS: [(&str, &str, f64, f64); 15] = [
     ("gyro_bias", "imu_bias", 0.0, 0.005),
     ("gyro_drift", "imu_bias", 0.0, 5e-5),

@@ -1,4 +1,5 @@
-//! The result of a diagnosis, which finds effects that a model lacks: verdict, ranking, confidence intervals, and sentences.
+//! The result of a diagnosis, which finds the physical effects (contributions to forces and moments) that a model lacks: verdict,
+//! ranking, confidence intervals, and sentences.
 
 pub(super) mod advice;
 pub(super) mod curves;

@@ -1,5 +1,6 @@
-//! List of the candidate effects with their estimates and the results of their checks. A candidate with enough evidence is
-//! asserted if it passes all checks, and refused otherwise.
+//! List of the candidates, which are effects (physical contributions to forces and moments) that the model may lack, with their
+//! estimates and the results of their checks. A candidate with enough evidence is asserted if it passes all checks, and refused
+//! otherwise.
 
 use std::collections::BTreeMap;
 
@@ -74,7 +75,7 @@ pub fn void(found: &Found, options: &Options) -> Vec<String> {
 }
 
 /// Smallest detectable amounts by effect id. An effect that was added to the model keeps the amount from the first round of the
-/// search.
+/// search, before any effect was added.
 fn least(found: &Found) -> BTreeMap<&'static str, f64> {
     let mut least = detectable(&found.first, found.threshold);
     if let Some(last) = &found.last {

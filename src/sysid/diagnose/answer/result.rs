@@ -1,6 +1,7 @@
 //! The result of a diagnosis, serialised to JSON (`greylag.diagnosis/1`). A diagnosis compares a model with flights and finds
-//! effects that the model lacks. A candidate is an effect that the model may lack. An effect is asserted if the diagnosis states
-//! that the model lacks it.
+//! effects (physical contributions to forces and moments) that the model lacks. A candidate is an effect that the model may lack.
+//! The catalogue has the effects that the program knows. In each round of the search the model is linearised and the candidates
+//! are ranked. An effect is asserted if the diagnosis states that the model lacks it.
 
 use serde::Serialize;
 

@@ -1,4 +1,5 @@
-//! Test whether misaligned axes of the sensors explain the residual better than missing effects.
+//! Test whether misaligned axes of the sensors explain the residual better than missing effects (physical contributions to forces
+//! and moments).
 //!
 //! If the board with the sensors is mounted with a pitch of 3°, part of every roll appears as yaw, as with a product of
 //! inertia, and part of lift as drag. The flight-path reconstruction cannot show the misalignment, because all quantities

@@ -32,7 +32,7 @@ pub struct Content<'a> {
     pub why_unknown: Option<WhyUnknown>,
     /// Physically impossible estimates, in words.
     pub doubtful: &'a [String],
-    /// All candidates, the asserted effects first.
+    /// All candidates (physical effects that the model may lack), the asserted effects first.
     pub effects: &'a [Candidate],
     /// Unexplained residual of each channel.
     pub channels: &'a [ChannelLeft],

@@ -86,7 +86,8 @@ fn worst_of(mut points: Vec<Point>, channel: usize) -> Option<String> {
     best.map(|(_, words)| words)
 }
 
-/// The coefficients of `model`, as given and as re-estimated in the last round of the search.
+/// The coefficients of `model`, as given and as re-estimated in the last round of the search, a linearisation of the model over
+/// the flights.
 pub fn tuned(found: &Found, model: &GreyBox) -> Vec<Tuned> {
     let round = found.round();
     let p = &round.projected;

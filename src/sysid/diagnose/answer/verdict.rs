@@ -1,11 +1,12 @@
-//! Sentence that states the verdict of a diagnosis.
+//! Sentence that states the verdict of a diagnosis: whether the model lacks effects (physical contributions to forces and
+//! moments). The catalogue has the effects that the program knows.
 
 use crate::diagnose::answer::result::{Candidate, Status, Verdict};
 use crate::diagnose::answer::sentences::{Content, SHOWN, WhyUnknown, values};
 use crate::diagnose::search::stepwise::{Found, HELD_OUT};
 
-/// A refused effect is named as the closest one if it removes more than this share of the residual from held-out
-/// blocks.
+/// A refused effect is named as the closest one if it removes more than this share of the residual from held-out blocks
+/// (stretches of flight that its fit did not use).
 const CLOSEST: f64 = 0.5;
 
 /// Sentence that states the verdict. `None` if effects are asserted, because each of them has its own sentence.

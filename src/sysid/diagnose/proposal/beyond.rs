@@ -61,8 +61,8 @@ pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel
     Some((why.into(), vec![library.terms[0].form.channel]))
 }
 
-/// Searches free forms for `channels` in the residual of the library's first round. Then selects among these forms and
-/// the library's best forms, starting from `tuned`. `why` is the reason for the search.
+/// Searches free forms for `channels` in the residual of the library's first round (linearisation of the model over the flights).
+/// Then selects among these forms and the library's best forms, starting from `tuned`. `why` is the reason for the search.
 ///
 /// Returns a record of the free forms, and the new selection. `None` if the library's search tried nothing, or if the
 /// model cannot be evaluated over the flights.

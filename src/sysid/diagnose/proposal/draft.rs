@@ -1,4 +1,5 @@
-//! Writes a proposed formula as a line of text and as an effect file, which defines an effect of a model by a formula.
+//! Writes a proposed formula as a line of text and as an effect file, which defines an effect (a physical contribution to forces
+//! and moments) by a formula.
 
 use super::grades;
 use super::library::{Form, Shape};

@@ -1,5 +1,5 @@
-//! Forward selection of the terms of a formula for a missing effect. A form is a function of some variables. A term is a form
-//! times a coefficient. A round is the model linearised over the flights, with the forms as candidates of a regression.
+//! Forward selection of the terms of a formula for a missing effect, a force or moment. A form is a function of some variables. A
+//! term is a form times a coefficient. A round is the model linearised over the flights, with the forms as candidate regressors.
 
 use super::draft::{self, Term};
 use super::grades;

@@ -1,4 +1,5 @@
-//! Test of a proposed formula on held-out flights: how much of the residual it removes, compared with chance.
+//! Test of a proposed formula on held-out flights, which the search did not use: how much of the residual it removes, compared
+//! with chance.
 
 use super::draft::Term;
 use super::forward::ORDER;

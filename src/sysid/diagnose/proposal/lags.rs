@@ -1,4 +1,5 @@
-//! Search for a formula of a missing effect in which controls pass through a first-order lag.
+//! Search for a formula of a missing effect (a physical contribution to forces and moments) in which controls pass through a
+//! first-order lag.
 //!
 //! A form is a function of some variables; a formula is a sum of forms with coefficients. The forms of the library depend only on
 //! present values. If a moment follows an engine or a flap with a lag, the library's formula contains the present control. It

@@ -178,7 +178,7 @@ impl Form {
         format!("{force}{}{}", units.concat(), if squared { units.concat() } else { String::new() })
     }
 
-    /// Identifier of the form as a candidate effect.
+    /// Identifier of the form as a candidate, a physical effect that the model may lack.
     pub fn id(&self) -> String {
         let text = match self.shape {
             // the text is too long for an identifier

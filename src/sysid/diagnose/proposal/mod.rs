@@ -1,5 +1,6 @@
-//! Proposes a formula for an effect that a model lacks and that no entry of the catalogue describes. The formula is searched for,
-//! tested on held-out flights and described in words.
+//! Proposes a formula for an effect (a physical contribution to forces and moments) that a model lacks and that the catalogue of
+//! known effects does not contain. The formula is searched for, tested on held-out flights, which the search did not use, and
+//! described in words.
 
 mod beyond;
 mod draft;

@@ -1,6 +1,6 @@
-//! Proposes a formula for an effect that a model lacks and that the catalogue does not contain. The formula is found term by
-//! term on some flights and tested on other flights. The terms come from a library of shapes or are expressions of a
-//! grammar (free forms).
+//! Proposes a formula for an effect (a physical contribution to forces and moments) that a model lacks and that the catalogue of
+//! known effects does not contain. The formula is found term by term on some flights and tested on other flights, which are held
+//! out. The terms come from a library of shapes or are expressions of a grammar (free forms).
 
 use super::beyond::{better, beyond, doubt};
 use super::draft::{self, Term};

@@ -1,8 +1,9 @@
 //! The result of a search for a formula, serialized to JSON (`greylag.proposal/1`).
 //!
-//! The formula describes an effect that the model lacks. It is a sum of terms, each of which acts in one channel (component of
-//! force or moment). The terms are chosen from the forms of a library, or from free forms, which are arbitrary expressions.
-//! The evidence of a term is the smaller of its penalised likelihood gain and its Wald statistic.
+//! The formula describes an effect (a physical contribution to forces and moments) that the model lacks. It is a sum of terms,
+//! each of which acts in one channel (component of force or moment). The terms are chosen from the forms of a library, or from
+//! free forms, which are arbitrary expressions. The evidence of a term is the smaller of its penalised likelihood gain and its
+//! Wald statistic.
 
 use serde::Serialize;
 
@@ -82,7 +83,7 @@ pub struct Settings {
     pub seed: u64,
     /// Number of bootstrap draws under the null hypothesis, which determine the critical values.
     pub nulls: usize,
-    /// Ids of the effects that were excluded from the catalogue.
+    /// Ids of the effects that were excluded from the catalogue of known effects.
     pub without: Vec<String>,
     /// Whether free forms may be tried.
     pub free_forms: bool,

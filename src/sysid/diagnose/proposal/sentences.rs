@@ -1,7 +1,7 @@
-//! Wording of a proposal, which is a formula for an effect outside the catalogue.
+//! Wording of a proposal, which is a formula for an effect outside the catalogue of known effects.
 //!
-//! The sentences are on the formula, its certain properties, the free forms and the test on held-out flights. A free form is a
-//! formula that is composed from functions instead of taken from the library of formulas.
+//! The sentences are on the formula, its certain properties, the free forms and the test on held-out flights, which the search
+//! did not use. A free form is a formula that is composed from functions instead of taken from the library of formulas.
 
 use super::draft::Term;
 use super::free::grammar::MOST_NODES;

@@ -1,6 +1,7 @@
-//! Candidates of a diagnosis, which are effects that the model may lack, and their regressors (columns). A column has one row for
-//! each window, a short stretch of flight over which forces and moments are averaged. A shape constant is a coefficient in which
-//! an effect is nonlinear. A candidate with shape constants is linearised at several points: sets of values of its coefficients.
+//! Candidates of a diagnosis, which are effects (physical contributions to forces and moments) that the model may lack, and their
+//! regressors (columns). A column has one row for each window, a short stretch of flight over which forces and moments are
+//! averaged. A shape constant is a coefficient in which an effect is nonlinear. A candidate with shape constants is linearised at
+//! several points: sets of values of its coefficients.
 
 use rayon::prelude::*;
 
@@ -40,8 +41,8 @@ impl Entry {
     }
 }
 
-/// The candidates for `model`: effects of the catalogue, and the effects `with` from effect files. Left out are the effects
-/// `without`, effects that `model` already has, and effects that cannot be searched for.
+/// The candidates for `model`: effects of the catalogue (the effects that the program knows), and the effects `with` from effect
+/// files. Left out are the effects `without`, effects that `model` already has, and effects that cannot be searched for.
 pub fn candidates(model: &GreyBox, with: &[String], without: &[String]) -> Vec<Entry> {
     let of = |about: Description, operator| Entry { about, operator };
     let physical = on_air().map(|about| of(about, false));

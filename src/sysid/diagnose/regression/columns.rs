@@ -1,7 +1,8 @@
 //! Regressors (columns) of the regression that searches for missing effects. A column has the change of forces and moments for
 //! one unit of a parameter. It has one row for each window, a short stretch of flight over which they are averaged.
 //!
-//! The parameters are those of candidate effects, and nuisance parameters: sensor errors and coefficients of the model.
+//! The parameters are those of candidates (physical effects that the model may lack), and nuisance parameters: sensor errors and
+//! coefficients of the model.
 
 use std::ops::Range;
 

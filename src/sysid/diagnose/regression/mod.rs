@@ -1,5 +1,5 @@
-//! Linear regression by which candidate effects are ranked: regressors, whitening, and elimination of the nuisance parameters
-//! (Frisch–Waugh–Lovell).
+//! Linear regression by which the candidates (physical effects that the model may lack) are ranked: regressors, whitening, and
+//! elimination of the nuisance parameters (Frisch–Waugh–Lovell).
 
 pub(super) mod catalogue;
 pub(super) mod cells;

@@ -2,7 +2,8 @@
 //!
 //! The data are means over windows, which are short stretches of flight. A cell contains the windows of one channel of one
 //! flight. A block is a stretch of about 4 s. A column is a regressor. The noise is what a ridge regression of the model's
-//! residual leaves unexplained if all coefficients of the model and all candidate effects are regressors.
+//! residual leaves unexplained if all coefficients of the model and all candidates (physical effects that it may lack) are
+//! regressors.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 

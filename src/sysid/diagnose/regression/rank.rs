@@ -1,5 +1,5 @@
-//! Evidence for each candidate, an effect that the model may lack. It is the smaller of the penalised likelihood gain (as in
-//! the BIC) and a Wald statistic with a block-robust covariance. The data are whitened regressor columns and residuals, from
+//! Evidence for each candidate, a physical effect that the model may lack. It is the smaller of the penalised likelihood gain (as
+//! in the BIC) and a Wald statistic with a block-robust covariance. The data are whitened regressor columns and residuals, from
 //! which the model's own coefficients have been projected out. Blocks are sections of the flights.
 
 use nalgebra::{DMatrix, DVector};

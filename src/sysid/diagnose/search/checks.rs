@@ -1,5 +1,5 @@
-//! Checks of a candidate (an effect that the model may lack) in addition to its evidence: error on held-out blocks, stability
-//! over bootstraps, and consistency between flights. The limits of the checks are in `stepwise/examine.rs` and
+//! Checks of a candidate (a physical effect that the model may lack) in addition to its evidence: error on held-out blocks,
+//! stability over bootstraps, and consistency between flights. The limits of the checks are in `stepwise/examine.rs` and
 //! `stepwise/judge.rs`.
 //!
 //! The checks use the regression of the search. Its rows are means over windows (short stretches of flight) in six channels, the

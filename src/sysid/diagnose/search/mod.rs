@@ -1,4 +1,5 @@
-//! Forward selection of the effects that a model lacks: ranking of candidates, checks, and critical values.
+//! Forward selection of the effects (physical contributions to forces and moments) that a model lacks: ranking of the candidates,
+//! checks, and critical values.
 
 pub(super) mod checks;
 pub(crate) mod clocks;

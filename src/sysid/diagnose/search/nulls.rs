@@ -1,6 +1,7 @@
 //! Critical value of the evidence, from bootstrap draws under the null hypothesis that no effect is missing.
 //!
-//! The evidence is the test statistic of a candidate effect. A block is a section of a flight with its own random sign.
+//! The evidence is the test statistic of a candidate, a physical effect that the model may lack. A block is a section of a flight
+//! with its own random sign.
 
 use nalgebra::DVector;
 use rand::RngExt;

@@ -1,5 +1,5 @@
 //! A round of the search for missing effects: the model, linearised over all flights, and the regressors (columns) of the
-//! candidates (effects that the model may lack).
+//! candidates (physical effects that the model may lack).
 //!
 //! A column has one row for each window (a short stretch of flight) and channel (a force or moment). Nuisance parameters are
 //! estimated but are not of interest: coefficients of the model, constants of a flight, sensor errors. Their columns are

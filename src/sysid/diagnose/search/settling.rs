@@ -1,4 +1,5 @@
-//! Ranks the candidate effects, and re-estimates the model after a candidate has been added.
+//! Ranks the candidates, which are effects (physical contributions to forces and moments) that the model may lack, and
+//! re-estimates the model after a candidate has been added.
 //!
 //! The evidence of a candidate is the smaller of its penalised likelihood gain and its Wald statistic. A round of the search
 //! ranks all candidates once.

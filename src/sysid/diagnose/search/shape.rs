@@ -1,5 +1,6 @@
-//! Lack-of-fit test: regression of the residual on products of states and deflections (the terms). If an effect was added and
-//! the terms still explain part of the residual, the formula of the effect differs from the true one.
+//! Lack-of-fit test: regression of the residual on products of states and deflections (the terms). If an effect (a physical
+//! contribution to forces and moments) was added and the terms still explain part of the residual, the formula of the effect
+//! differs from the true one.
 //!
 //! The flexible model of [`remainder`](super::remainder) must generalise to other flights and detects only large errors. This
 //! test fits a few terms, similar to those of aerodynamic tables, to the same flights. It compares their reduction of the

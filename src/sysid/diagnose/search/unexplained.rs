@@ -14,8 +14,8 @@ struct Measured {
     noise: f64,
 }
 
-/// Variances of every channel in the flights of `first`, the first round of the search. `None` for a channel that is not
-/// measured.
+/// Variances of every channel in the flights of `first`, the first round of the search, before any effect was added. `None`
+/// for a channel that is not measured.
 fn measured(first: &Round) -> [Option<Measured>; CHANNELS] {
     let series: Vec<Vec<Series>> =
         first.flights.iter().map(|f| windows::channels(&first.model, &f.measured)).collect();

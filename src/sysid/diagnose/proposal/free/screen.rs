@@ -1,9 +1,9 @@
 //! Computes how much of the residual of one channel (a force or a moment) each form explains. A form is a candidate formula
 //! without its coefficient. It is a regressor in a linear regression of the residual.
 //!
-//! The regression is over windows, short stretches of flight over which data are averaged. Residual and regressors are
-//! whitened: filtered so that the noise becomes white. The nuisance parameters (coefficients of the model, sensor errors) are
-//! projected out of both. The statistics are those of the search in the catalogue
+//! The regression is over windows, short stretches of flight over which data are averaged. Residual and regressors are whitened:
+//! filtered so that the noise becomes white. The nuisance parameters (coefficients of the model, sensor errors) are projected out
+//! of both. The statistics are those of the search in the catalogue of known effects
 //! ([`Score`](crate::diagnose::regression::rank::Score)), but without its correction for noise in the regressors. The final
 //! ranking applies this correction to the best forms.
 //!

@@ -1,5 +1,6 @@
-//! The errors-in-variables bias: the mean of the scalar products of regressors (columns) and residual that is due to sensor noise
-//! in both. It is computed by adding simulated noise to the flights.
+//! The errors-in-variables bias. The residual and the regressors (columns) contain the same sensor noise. The expected values of
+//! their scalar products are therefore not zero, even if the model is right. This bias is estimated by adding simulated noise to
+//! the flights.
 
 use crate::diagnose::regression::shared;
 use rayon::prelude::*;
@@ -16,7 +17,8 @@ use greylag_model::GreyBox;
 /// error that did not exist was 3, 11 or 19, depending on the seed.
 const DRAWS: usize = 8;
 
-/// Flights, model and candidate effects of a round of the search. In a round, the model is linearised over all flights.
+/// Flights, model and candidates (physical effects that the model may lack) of a round. In a round of the search, the model is
+/// linearised over all flights and the candidates are ranked.
 pub(super) struct Setting<'a> {
     pub(super) problem: &'a Problem,
     pub(super) model: &'a GreyBox,

@@ -1,6 +1,6 @@
-//! Checks of the best candidate (an effect that the model may lack) before it is added to the model. The evidence is the test
-//! statistic by which candidates are ranked. The residual beyond noise is the residual sum of squares minus its expectation for
-//! pure noise. A block is a stretch of about 4 s of a flight.
+//! Checks of the best candidate (a physical effect that the model may lack) before it is added to the model. The evidence is the
+//! test statistic by which candidates are ranked. The residual beyond noise is the residual sum of squares minus its expectation
+//! for pure noise. A block is a stretch of about 4 s of a flight.
 
 use super::found::{Found, Selected};
 use crate::diagnose::options::Options;
@@ -9,7 +9,7 @@ use crate::diagnose::search::checks;
 use crate::diagnose::search::round::Round;
 use crate::diagnose::search::unexplained::explained;
 
-/// The effect must remove at least this share of the residual beyond noise in held-out blocks.
+/// The effect must remove at least this share of the residual beyond noise in held-out blocks, which its fit did not use.
 pub const HELD_OUT: f64 = 0.1;
 /// The effect, or one that the flights cannot distinguish from it, must rank first in at least this share of block bootstraps.
 pub const SELECTED: f64 = 0.8;

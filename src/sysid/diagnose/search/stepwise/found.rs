@@ -1,6 +1,6 @@
-//! Result of the search for missing effects: the selected effects with their checks, and the remaining residual. In each round
-//! of the search the model is linearised over all flights and the candidate effects are ranked. Evidence is the test statistic
-//! of the ranking. A flexible model is a regression without physics.
+//! Result of the search for missing effects: the selected effects with their checks, and the remaining residual. In each round of
+//! the search the model is linearised over all flights and the candidates (effects that it may lack) are ranked. Evidence is the
+//! test statistic of the ranking. A flexible model is a regression without physics.
 
 use crate::diagnose::regression::gather::Column;
 use crate::diagnose::regression::rank::Score;
@@ -25,7 +25,8 @@ pub struct Selected {
     pub threshold: f64,
     /// Ids of effects that the data cannot distinguish from this effect.
     pub class: Vec<String>,
-    /// Share of the residual beyond noise that the effect removes from held-out blocks; NaN if it cannot be computed.
+    /// Share of the residual beyond noise that the effect removes from held-out blocks, which its fit did not use; NaN if it
+    /// cannot be computed.
     pub heldout: f64,
     /// Share of block bootstraps in which the effect, or an effect of `class`, ranks first.
     pub selected: f64,

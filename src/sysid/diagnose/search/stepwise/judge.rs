@@ -1,5 +1,5 @@
-//! Refuses effects that the search has selected, mainly because too much of the residual remains in their channels. A refused
-//! effect is reported but not asserted. A channel is a force or a moment.
+//! Refuses effects (physical contributions to forces and moments) that the search has selected, mainly because too much of the
+//! residual remains in their channels. A refused effect is reported but not asserted. A channel is a force or a moment.
 
 use super::found::{Found, Selected};
 use crate::compare::ChannelId;

@@ -1,5 +1,5 @@
-//! Decides between candidate effects with similar scores. Each is added to the model alone, all coefficients are
-//! re-estimated, and the remaining errors are compared.
+//! Decides between candidates (physical effects that the model may lack) with similar scores. Each is added to the model alone,
+//! all coefficients are re-estimated, and the remaining errors are compared.
 
 use super::found::Found;
 use crate::diagnose::search::checks;
