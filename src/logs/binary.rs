@@ -53,6 +53,7 @@ pub(super) fn read(
         findings.extend(assess::channels(&table.channels, &table.rows, &flies));
         let found = on_wings(&table.rows, &hovers, &flies);
         findings.extend(found.into_iter().map(|f| named(f, &table.rules, o)));
+        screening::leave_out_dead(&mut table.rows, &flies);
     }
     let kept = kept(&mut table, path, o, to, &mut findings)?;
     findings.extend(dropped(kept.dropped, &kept.dropped_rows));

@@ -75,6 +75,7 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
     findings.extend(assess::channels(&channels, &raw.rows, &flies));
     if !timeless {
         findings.extend(screening::screen(&raw.rows, &flies));
+        screening::leave_out_dead(&mut raw.rows, &flies);
     }
     findings.extend(made.iter().map(Finding::note));
     let reading = match lacking {

@@ -8,13 +8,40 @@ use crate::finding::Finding;
 
 /// Findings about measured columns that are constant in all rows.
 pub fn check(rows: &[Sample]) -> Vec<Finding> {
+    seen(rows).iter().zip(COLUMNS).filter_map(|(seen, (name, ..))| dead(seen, name)).collect()
+}
+
+/// Columns of sensors without which a flight can be reconstructed.
+const OPTIONAL: [&str; 9] = [
+    "yaw_rad",
+    "alpha_rad",
+    "beta_rad",
+    "ax_mps2",
+    "ay_mps2",
+    "az_mps2",
+    "vn_mps",
+    "ve_mps",
+    "vd_mps",
+];
+
+/// Sets those of the [`OPTIONAL`] columns that are constant in all rows to NaN. An example is the vertical velocity of a
+/// horizontal GPS export.
+pub fn blank(rows: &mut [Sample]) {
+    for (seen, (name, _, place)) in seen(rows).iter().zip(COLUMNS) {
+        if OPTIONAL.contains(&name) && dead(seen, name).is_some() {
+            rows.iter_mut().for_each(|row| *place(row) = f64::NAN);
+        }
+    }
+}
+
+fn seen(rows: &[Sample]) -> [Seen; COLUMNS.len()] {
     let mut seen = COLUMNS.map(|_| Seen::default());
     for block in rows.chunks(BLOCK) {
         for (seen, (_, get, _)) in seen.iter_mut().zip(COLUMNS).filter(|(seen, _)| !seen.moves) {
             block.iter().map(get).filter(|x| x.is_finite()).for_each(|x| seen.take(x));
         }
     }
-    seen.iter().zip(COLUMNS).filter_map(|(seen, (name, ..))| dead(seen, name)).collect()
+    seen
 }
 
 /// First value of a column, number of its values, and whether they differ.
@@ -41,8 +68,11 @@ fn dead(seen: &Seen, name: &'static str) -> Option<Finding> {
         "{name} is constantly {first} over all {} rows: a sensor that is absent or dead",
         seen.count
     );
-    let needed = NEEDED.contains(&name);
-    Some(if needed { Finding::problem(text) } else { Finding::warning(text) })
+    Some(match name {
+        name if NEEDED.contains(&name) => Finding::problem(text),
+        name if OPTIONAL.contains(&name) => Finding::warning(text + "; it is not used"),
+        _ => Finding::warning(text),
+    })
 }
 
 /// Returns a problem if the commands of aileron and elevator are constant in flight and no recorded deflection of these surfaces
@@ -80,4 +110,24 @@ fn may_rest(name: &str) -> bool {
             name,
             "rudder_rad" | "air_density_kgpm3" | "rate_hold_s" | "throttle" | "altitude_m"
         )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_constant_vertical_velocity_is_not_used() {
+        let row = |k: usize| {
+            let north = 15.0 + (k as f64).sin();
+            let velocity_ned_mps = [north, 0.1 * north, 0.0];
+            Sample { time_s: k as f64, velocity_ned_mps, aileron_rad: 0.0, ..Sample::default() }
+        };
+        let mut rows: Vec<Sample> = (0..200).map(row).collect();
+        let said: Vec<String> = check(&rows).into_iter().map(|f| f.text).collect();
+        assert!(said.iter().any(|s| s.starts_with("vd_mps") && s.ends_with("it is not used")));
+        blank(&mut rows);
+        assert!(rows.iter().all(|r| r.velocity_ned_mps[2].is_nan() && r.aileron_rad == 0.0));
+        assert!(rows.iter().all(|r| r.velocity_ned_mps[0].is_finite()));
+    }
 }

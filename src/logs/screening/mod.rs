@@ -50,6 +50,13 @@ pub fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
     out
 }
 
+/// Sets optional columns to NaN that are constant although the aircraft flies. [`screen`] reports them.
+pub fn leave_out_dead(rows: &mut [Sample], flies: &Flying) {
+    if rows.len() >= ENOUGH && !in_flight(rows, flies).is_empty() {
+        dead::blank(rows);
+    }
+}
+
 /// Checks of units, signs and axes. They use the rows in wing-borne flight (`flown`) if there are enough, because
 /// other relations hold in hover and on the ground.
 fn checks(rows: &[Sample], flown: &[Sample], flies: &Flying) -> Vec<Finding> {
