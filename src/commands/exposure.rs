@@ -1,6 +1,6 @@
-//! Access control of the links. The link to a client (a ground station or an offboard program) must be reachable from this
-//! machine only, or be signed, unless the user allows unsigned links explicitly. The vehicle's link may be unsigned and
-//! reachable, with a warning.
+//! Access control of the links. A client is a ground station or an offboard program. Its link must be signed or reachable from
+//! this machine only, unless the user allows unsigned links explicitly. The vehicle's link may be unsigned and reachable, with a
+//! warning.
 
 use anyhow::{Result, bail};
 

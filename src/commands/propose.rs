@@ -109,7 +109,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// Divides the logs into those for the search and those for the test. If no log is held out by `--hold-out`, the last log is
+/// Divides the logs into logs for the search and logs for the test. If no log is held out by `--hold-out`, the last log is for
+/// the test.
 /// for the test.
 fn divided(arguments: &Arguments) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
     let (logs, held) = (&arguments.logs.paths, &arguments.hold_out);

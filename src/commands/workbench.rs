@@ -1,5 +1,6 @@
-//! `greylag workbench`: a page in the browser on which a model is compared with flight logs and effects (physical contributions
-//! to forces and moments) that it lacks are added to it. A session keeps the model, the flights and the results in a folder.
+//! `greylag workbench`: a page in the browser. The user compares a model with flight logs there and adds missing effects to the
+//! model. An effect is a physical contribution to forces and moments. A session keeps the model, the flights and the results in a
+//! folder.
 
 use std::io::Write;
 use std::path::PathBuf;

@@ -37,7 +37,7 @@ const DELAYS: [usize; 4] = [0, 2, 4, 6];
 const LONGEST: usize = DELAYS[DELAYS.len() - 1];
 /// Time constant of the running mean square error by which the delays are compared, s.
 const FORGETTING_S: f64 = 20.0;
-/// Rate at which forgetting enlarges each variance that is below its prior variance, as a fraction of the latter, 1/s.
+/// Rate at which forgetting enlarges each variance that is below its prior variance, as a fraction of the prior variance, 1/s.
 const AGEING: f64 = 1e-4;
 /// Accepted sample intervals, s.
 const STEPS_S: std::ops::RangeInclusive<f64> = 0.002..=0.05;

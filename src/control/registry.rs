@@ -1,8 +1,8 @@
 //! The registry of controllers: their names, what they need, and their construction.
 //!
-//! A planner is a controller that searches for a sequence of commands in simulations of the model, by CEM (cross-entropy
-//! method), MPPI (model predictive path integral) or iLQR (iterative linear quadratic regulator). A policy is a trained
-//! network. The LQI is a linear quadratic controller with integral action.
+//! A planner is a controller that searches for a sequence of commands in simulations of the model. Its method is CEM
+//! (cross-entropy method), MPPI (model predictive path integral) or iLQR (iterative linear quadratic regulator). A policy is a
+//! trained network. The LQI is a linear quadratic controller with integral action.
 
 use std::fmt;
 use std::str::FromStr;

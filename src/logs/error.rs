@@ -1,10 +1,10 @@
-//! Reasons for which a flight log cannot be read.
+//! Reasons why a flight log cannot be read or used.
 
 use std::path::PathBuf;
 
 use super::csv::CsvError;
 
-/// Reason for which a flight log cannot be read.
+/// The reason why a flight log cannot be read or used.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// The file cannot be read.

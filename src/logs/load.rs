@@ -76,8 +76,7 @@ pub struct Log {
     pub flies: Flying,
     /// The vehicle; `None` if the log does not name it.
     pub vehicle: Option<Vehicle>,
-    /// Intervals (from, to), s, in which the aircraft is not flying on its wing, such as the hover of a VTOL. Their rows are
-    /// left out.
+    /// Intervals (from, to), s, in which a VTOL is not wing-borne, for example in hover. Their rows are left out.
     pub hovers: Vec<(f64, f64)>,
     /// All instances of each topic that has more than one.
     pub sources: Vec<Source>,

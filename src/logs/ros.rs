@@ -53,7 +53,8 @@ struct Reader<'w> {
     in_step: bool,
     /// Number of bytes that belong to no record.
     skipped: usize,
-    /// Time between the last message before and the first one after each damaged place, s. NaN until the latter is read.
+    /// Length of the gap at each damaged place, s: from the last message before it to the first one after it. NaN until that
+    /// message is read.
     holes: Vec<f64>,
     /// The recorder's time of the last message, ns since 1970.
     last_ns: Option<u64>,

@@ -3,10 +3,10 @@
 //! A ULog file consists of records: formats of topics, subscriptions (which give a topic a message number), data records with
 //! such a number, parameters, and others.
 //!
-//! No published crate is used (examined: `px4-ulog` 0.6.1, `yule_log` 0.4.0). `px4-ulog` stops at the first inconsistent record,
-//! refuses a second subscription with the same message number, panics by design where a value's type changes, and decodes every
-//! field of every topic. `yule_log` depends on a logger and on a regular-expression engine. Neither can skip topics that are not
-//! needed. `tests/logs_crosscheck.py` compares the results with pyulog.
+//! No published crate is used (examined: `px4-ulog` 0.6.1, `yule_log` 0.4.0). `px4-ulog` stops at the first inconsistent record
+//! and refuses a second subscription with the same message number. It panics by design where a value's type changes. `yule_log`
+//! depends on a logger and on a regular-expression engine. Neither can skip topics that are not needed.
+//! `tests/logs_crosscheck.py` compares the results with pyulog.
 //!
 //! Not read: logged strings, offsets of appended data (it is read in file order), default values of parameters. If a parameter
 //! changes in flight, the last value is kept.
@@ -70,7 +70,8 @@ struct Reader {
     in_step: bool,
     /// Number of bytes that belong to no record.
     skipped: usize,
-    /// Time between the last data record before and the first one after each damaged place, s. NaN until the latter is read.
+    /// Length of the gap at each damaged place, s: from the last data record before it to the first one after it. NaN until that
+    /// record is read.
     holes: Vec<f64>,
     /// Time of the last data record, s.
     last_s: f64,

@@ -1,4 +1,4 @@
-//! Type of the vehicle, and the times in which it does not fly on its wings, from the log's own records.
+//! Type of the vehicle, and the intervals in which a VTOL hovers or is in transition. Both are read from the records of the log.
 //!
 //! Sources: MAV_TYPE of HEARTBEAT, vtol_state of EXTENDED_SYS_STATE (MAVLink common.xml); vehicle_status and
 //! vtol_vehicle_status (PX4 msg/); Q_ENABLE, Q_TILT_MASK, FRAME_CLASS, SERVOn_FUNCTION 33 to 40, the mode numbers 17 to
@@ -9,13 +9,13 @@ use serde::Serialize;
 use super::Format;
 use super::topics::Topics;
 
-/// The kind of a vehicle.
+/// The types of vehicle that are distinguished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// Aircraft that flies on its wings only.
+    /// A fixed-wing aircraft, which is always wing-borne in flight.
     FixedWing,
-    /// Aircraft that hovers and flies on its wings.
+    /// An aircraft that can hover and can fly wing-borne.
     Vtol,
     /// A multicopter, which has no wings.
     Multicopter,
@@ -24,7 +24,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// The name of the kind as shown to the user.
+    /// The name of the type as shown to the user.
     pub fn name(self) -> &'static str {
         match self {
             Kind::FixedWing => "fixed-wing aircraft",
@@ -38,7 +38,7 @@ impl Kind {
 /// A vehicle type, with the record that shows it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Vehicle {
-    /// Type of the vehicle.
+    /// The type that the record shows.
     pub kind: Kind,
     /// Name of the log's record that shows the type.
     pub by: String,
@@ -74,7 +74,7 @@ fn found(kind: Kind, by: impl Into<String>) -> Option<Vehicle> {
     Some(Vehicle { kind, by: by.into() })
 }
 
-/// Kind of vehicle of the MAV_TYPE `number`; `None` for other types, such as a ground station.
+/// Type of vehicle with the MAV_TYPE `number`; `None` for numbers of anything else, such as a ground station.
 fn by_type(number: f64) -> Option<Kind> {
     Some(match number as i64 {
         1 | 16 | 28 => Kind::FixedWing,
@@ -178,13 +178,13 @@ fn telemetry(topics: &Topics) -> Option<Vehicle> {
 
 /// Mode numbers of ArduPlane in which the aircraft hovers.
 const HOVER_MODES: [f64; 8] = [17.0, 18.0, 19.0, 20.0, 21.0, 22.0, 23.0, 25.0];
-/// Throttle of the lift motors (0..1) above which they count as carrying the aircraft. For servo pulses, the limit is three
-/// times as large.
+/// Throttle of the lift motors (0..1) above which they count as carrying the aircraft. A servo pulse must exceed the minimum by
+/// three times this fraction of the range of pulses.
 const CARRIES: f64 = 0.05;
 /// Time for which a QTUN record is taken to hold, s. ArduPlane writes QTUN records while the lift motors may run.
 const QTUN_HOLDS_S: f64 = 0.5;
 
-/// Intervals of hover or transition (from, to, s), in which the aircraft does not fly on its wings alone.
+/// Intervals (from, to, s) in which a VTOL is not purely wing-borne: it hovers or is in transition.
 pub(super) fn hovers(format: Format, topics: &Topics) -> Vec<(f64, f64)> {
     let mut spans = Vec::new();
     match format {
@@ -245,7 +245,8 @@ fn lift_by_qtun(topics: &Topics) -> Vec<(f64, f64)> {
     merged(carries.map(|(t, _)| (*t, t + QTUN_HOLDS_S)).collect())
 }
 
-/// Intervals (from, to, s) in which the servo pulses show that lift motors that cannot tilt forward carry the aircraft.
+/// Intervals (from, to, s) in which a lift motor carries the aircraft according to its servo pulse. Motors that can tilt forward
+/// are left out.
 fn lift_by_pulses(topics: &Topics) -> Vec<(f64, f64)> {
     let tilting = topics.parameter("Q_TILT_MASK").unwrap_or(0.0) as u32;
     let least = topics.parameter("Q_M_PWM_MIN").filter(|x| *x > 0.0).unwrap_or(1000.0);

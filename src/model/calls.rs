@@ -1,5 +1,5 @@
-//! Two ways to evaluate the equations of motion, which are long functions: by a call of a copy that is compiled once per scalar
-//! type, or inlined into the caller.
+//! Two ways to evaluate the equations of motion, which are long functions. One is a call of a copy that is compiled once per
+//! scalar type. In the other, the equations are inlined into the caller.
 //!
 //! A kernel that is compiled for several instruction sets must inline the equations, because a called copy would not use the
 //! kernel's instruction set. In other functions, inlining would only increase the size of the program and the compile time.

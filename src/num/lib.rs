@@ -1,5 +1,5 @@
-//! Numerics: the trait [`Real`] of the number types for which the model equations are generic (f64, SIMD vectors, dual numbers),
-//! and neural networks, tables, statistics and random numbers from a seed.
+//! Numerics: the trait [`Real`], neural networks, tables, statistics and random numbers from a seed. The model equations are
+//! generic over number types that implement [`Real`]: f64, SIMD vectors and dual numbers.
 
 pub mod bootstrap;
 pub mod dense;

@@ -1,5 +1,8 @@
 //! The point (state, controls and airflow) at which the effects of a model are evaluated. An effect is one physical contribution
-//! to the forces and moments.
+//! to the forces and moments. A wrench is a set of forces and moments.
+//!
+//! The effects are evaluated in two passes. The first pass evaluates the effects that depend only on the point. The second pass
+//! evaluates the other effects, which also depend on results of the first pass.
 
 use crate::airframe::Geometry;
 use crate::rigid_body::{ForceAxes, Vector};
@@ -67,12 +70,12 @@ pub struct Point<'a, R = f64> {
     pub geometry: &'a Geometry,
     /// Axes in which drag, side force and lift act.
     pub axes: ForceAxes,
-    /// Results of the first pass over the effects, for the effects that depend on them. Zero during the first pass.
+    /// Inputs of the effects in the second pass. Zero during the first pass.
     pub base: &'a Base<R>,
 }
 
-/// Results of the first pass over a model's effects. This pass evaluates the effects that depend only on state, controls
-/// and airflow.
+/// Inputs of the effects that depend on more than state, controls and airflow. The sums are taken over the other effects, which
+/// the first pass has evaluated.
 #[derive(Clone, Copy, Debug)]
 pub struct Base<R = f64> {
     /// Sum of the forces and moments of the effects in the first pass.
@@ -81,14 +84,15 @@ pub struct Base<R = f64> {
     pub force: Vector<R>,
     /// The part of `wrench` that is due to aileron, elevator and rudder.
     pub deflected: Wrench<R>,
-    /// The value that `wrench` would have with neutral surfaces and zero body rates.
+    /// The wrench that the same effects give with neutral surfaces and zero body rates.
     pub still: Wrench<R>,
-    /// Time derivative of the state under all effects of the model, in units of the state per second.
+    /// Time derivative of the state due to all effects of the model, in units of the state per second. It is iterated after the
+    /// first pass. Zero if no effect of the model depends on it.
     pub rate: State<R>,
 }
 
 impl<R: Real> Base<R> {
-    /// The results before the first pass: all zero.
+    /// The inputs before the first pass: all zero.
     #[inline(always)]
     pub fn zero() -> Self {
         let wrench = Wrench::zero();

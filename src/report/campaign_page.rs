@@ -1,7 +1,7 @@
 //! Page of a campaign: findings, tables with the paper's values, and the source of each number.
 //!
-//! A campaign is a planned set of runs over controllers, models and seeds. A cell is one of these runs. The paper is T. Guerin
-//! et al., 2026.
+//! A campaign is a planned set of runs over controllers, models and seeds. A cell is one of these runs. A stage is one command
+//! with all its cells. The paper is T. Guerin et al., 2026.
 
 use std::collections::BTreeMap;
 
@@ -190,8 +190,8 @@ impl CampaignReport<'_> {
     }
 }
 
-/// The interquartile mean over the seeds of the learning curves' column `column` at `steps`. `None` unless every seed has a
-/// value there.
+/// The interquartile mean of the learning curves at training step `steps`. `records` holds one learning curve per seed, and
+/// `column` is the plotted quantity. `None` unless every curve has a value at this step.
 fn middle(records: &[&Record], column: &str, steps: f64) -> Option<Estimate> {
     let value = |record: &&Record| {
         let at = record.curve.get("steps")?.iter().position(|s| *s == steps)?;

@@ -3,11 +3,19 @@
 //! A [`Page`] contains [`Section`]s under a title, and a section contains [`Figure`]s in order. [`Page::render`] converts a page
 //! to one string that includes styles, scripts and data.
 //!
-//! There is a page for each kind of result: an aircraft's model (`AircraftReport`), an effect of the catalogue (`EffectReport`),
-//! a flight ([`FlightReport`]), a comparison of models with flights ([`ComparisonReport`]), a diagnosis of missing effects
-//! ([`DiagnosisReport`]), an amended model ([`AmendmentReport`]), a trained model (`TrainingReport`), trainings of policies
-//! (`LearningReport`), an evaluation of controllers (`EvaluationReport`), and a campaign (`CampaignReport`). The embedded library
-//! uPlot 1.6.32 (MIT, `kit/assets/uPlot.LICENSE`) draws the plots in the browser.
+//! There is a page for each kind of result:
+//! - `AircraftReport`: an aircraft's model.
+//! - `EffectReport`: an effect of the catalogue.
+//! - [`FlightReport`]: a flight.
+//! - [`ComparisonReport`]: a comparison of models with flights.
+//! - [`DiagnosisReport`]: a diagnosis of missing effects.
+//! - [`AmendmentReport`]: an amended model.
+//! - `TrainingReport`: a trained model.
+//! - `LearningReport`: trainings of policies.
+//! - `EvaluationReport`: an evaluation of controllers.
+//! - `CampaignReport`: a campaign.
+//!
+//! The embedded library uPlot 1.6.32 (MIT, `kit/assets/uPlot.LICENSE`) draws the plots in the browser.
 //!
 //! All [`TimeFigure`]s of a page have the same time axis. Zoom and cursor are common to them.
 

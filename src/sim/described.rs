@@ -11,7 +11,7 @@ use greylag_physics::mixer::{Does, Effector};
 ///
 /// # Errors
 ///
-/// If some surfaces name a property for their position and others do not. The message names one of the latter.
+/// If some surfaces name a property for their position and others do not. The message names a surface without such a property.
 pub fn describe(plant: &mut PlantOptions, airframe: &Airframe) -> Result<(), String> {
     for (name, value) in &airframe.conditions {
         if plant.held.iter().all(|(held, _)| held != name) {

@@ -1,4 +1,4 @@
-//! JSBSim as an [`Environment`], in which controllers fly episodes.
+//! JSBSim as an [`Environment`]: controllers fly episodes in it.
 
 use greylag_sitl::plant::{Inputs, Plant, PlantOptions, Start, Truth};
 

@@ -1,5 +1,5 @@
-//! Separation of two candidates, which are effects (physical contributions to forces and moments) that a model may lack: how well
-//! a flight distinguishes them after the model's coefficients are refitted.
+//! Separation of two candidates: how well a flight distinguishes them after the model's coefficients are refitted. A candidate is
+//! an effect (a physical contribution to forces and moments) that a model may lack.
 //!
 //! A channel is a force or a moment. A window is a short section of the flight over which the channels are averaged.
 

@@ -1,5 +1,6 @@
-//! Signature of an effect (a physical contribution to forces and moments): curves that show how the effect changes forces and
-//! moments over one variable at a time (a sweep), and how it changes the response of the aircraft to a manoeuvre.
+//! Signature of an effect (a physical contribution to forces and moments). It consists of curves. They show how the effect
+//! changes forces and moments over one variable at a time (a sweep), and how it changes the response of the aircraft to a
+//! manoeuvre.
 
 use greylag_model::{GreyBox, JoinError, STEP, Trim, TrimError, Twin};
 use greylag_physics::effects::Description;
@@ -238,7 +239,7 @@ fn plainest(all: Vec<Pair>, most: usize) -> Vec<Pair> {
         let difference: Vec<f64> =
             pair.with.iter().zip(&pair.without).map(|(with, without)| with - without).collect();
         let largest = difference.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
-        // a change that varies along the axis is more informative than a constant one, so the latter counts a tenth
+        // a change that varies along the axis is more informative than a constant change, so a constant change counts a tenth
         (extent(&difference) + 0.1 * largest) / range(pair.y_label)
     };
     let mut ranked: Vec<(f64, &Pair)> =

@@ -1,6 +1,6 @@
-//! Fits the session's model together with the effects that the user accepted to add, stores the fits in the session's folder,
-//! and saves the amended model (refitted, with added effects). Errors are those of free runs, simulations from recorded
-//! states, over the fit flights or over the held-out flights, which the fit does not use.
+//! Fits the session's model together with the effects that the user accepted to add. It stores the fits in the session's folder,
+//! and saves the amended model (refitted, with added effects). Errors are errors of free runs, which are simulations from
+//! recorded states. They are computed over the fit flights or over the held-out flights, which the fit does not use.
 
 use std::fs;
 use std::path::Path;

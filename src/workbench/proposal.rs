@@ -137,8 +137,9 @@ impl Bench {
 }
 
 impl Inner {
-    /// The flights for the search for a formula, then those for its test, as in `greylag propose`. The former are the fit flights
-    /// and the latter the hold-out flights of the session. Without a hold-out flight, the last fit flight is used for the test.
+    /// The flights for the search for a formula, then the flights for the test of the formula, as in `greylag propose`. The
+    /// search uses the fit flights of the session, and the test uses its hold-out flights. Without a hold-out flight, the last
+    /// fit flight is used for the test.
     pub(super) fn searched(&self) -> Result<[Vec<Reconstruction>; 2], WorkbenchError> {
         let [fit, held] = self.searched_places()?;
         Ok([self.reconstructions(&fit), self.reconstructions(&held)])

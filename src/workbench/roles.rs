@@ -140,7 +140,7 @@ impl Inner {
         }
     }
 
-    /// Divides the flights into those for a fit and those for its validation, as `greylag amend` does.
+    /// Divides the flights into flights for a fit and flights for its validation, as `greylag amend` does.
     pub fn divided(&self) -> Result<Divided, WorkbenchError> {
         let fit = self.to_fit()?;
         let held = self.usable(&[Role::HoldOut]);

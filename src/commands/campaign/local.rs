@@ -241,7 +241,7 @@ impl Local<'_> {
         self.states.iter().filter(|s| **s == state).count()
     }
 
-    /// Two estimates, s: the processor time of all cells, and the remaining time of this run. The latter is the processor
+    /// Two estimates, s: the processor time of all cells, and the remaining time of this run. The remaining time is the processor
     /// time of the cells that have not ended, divided by the number of jobs. `None` if the cost of a stage is unknown.
     fn left(&self) -> Result<Option<[f64; 2]>> {
         let (mut all, mut left) = (0.0, 0.0);

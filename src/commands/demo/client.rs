@@ -1,5 +1,5 @@
-//! The client of the demonstration. It sends MAVLink commands to the companion, the program that flies the aircraft: it
-//! arms, enters offboard mode and commands the attitudes of a schedule over a UDP socket.
+//! The client of the demonstration. It sends MAVLink commands over a UDP socket to the companion, the program that flies the
+//! aircraft. It arms, enters offboard mode and commands the attitudes of a schedule.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -59,8 +59,8 @@ fn row(failure: Failure, watched: &[Watched], alarms: usize) -> Vec<String> {
     let mut delays: Vec<f64> = watched.iter().filter_map(Watched::delay_s).collect();
     delays.sort_by(f64::total_cmp);
     let at = |share: f64| {
-        // The quantile is taken over all engaged flights, in which the companion had control: undetected failures count as the
-        // longest delays.
+        // An engaged flight is one in which the companion had control. The quantile is taken over all engaged flights, so
+        // undetected failures count as the longest delays.
         let index = (share * engaged.max(1) as f64).ceil() as usize;
         delays.get(index.saturating_sub(1)).map_or("-".into(), |s| format!("{s:.1} s"))
     };

@@ -1,11 +1,11 @@
 //! Control power, damping and stiffness of one axis of an unknown aircraft, estimated in flight.
 //!
-//! The method is recursive least squares with a prior (a Kalman filter over constants, K. J. Åström, B. Wittenmark,
-//! "Adaptive Control", 2nd ed., 1995, section 2.2). The regression at cruise is ω̇ = b u − a ω − m α̂, with the body rate ω,
-//! the command u behind an assumed servo, the estimated change α̂ of the angle of attack, the control power b, the damping a
-//! and the stiffness m. At other airspeeds u and α̂ are multiplied by (V/V_cruise)² and ω by V/V_cruise. Both sides are
-//! differentiated and pass the same low-pass filters. The differentiation removes constant and slow influences (trim, wind,
-//! asymmetry).
+//! The method is recursive least squares with a prior (a Kalman filter over constants, K. J. Åström, B. Wittenmark, "Adaptive
+//! Control", 2nd ed., 1995, section 2.2). The regression at cruise is ω̇ = b u − a ω − m α̂. The body rate is ω, the command
+//! behind an assumed servo is u, and the estimated change of the angle of attack is α̂. The estimated parameters are the control
+//! power b, the damping a and the stiffness m. At other airspeeds u and α̂ are multiplied by (V/V_cruise)² and ω by V/V_cruise.
+//! Both sides are differentiated and pass the same low-pass filters. The differentiation removes constant and slow influences
+//! (trim, wind, asymmetry).
 
 use greylag_model::STEP;
 

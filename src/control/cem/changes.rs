@@ -1,7 +1,7 @@
 //! Changes of single settings of the planner, given as `KEY=VALUE` on a command line.
 //!
-//! The planner is a sampling MPC. In each tick (10 ms) it draws candidates, which are sequences of commands, simulates them with
-//! the model and fits the distribution of the next candidates to the best ones, the elites.
+//! The planner is a sampling MPC. In each tick (10 ms) it draws candidates, which are sequences of commands, and simulates them
+//! with the model. It then fits the distribution of the next candidates to the best ones, the elites.
 
 use std::fmt;
 use std::str::FromStr;

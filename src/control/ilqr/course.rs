@@ -189,7 +189,7 @@ impl Task<'_> {
     }
 
     /// Returns the intermediate bank with the smallest cost. It replaces the present one, `flown`, only if its cost is below the
-    /// fraction `BETTER` of the latter's cost.
+    /// fraction `BETTER` of the cost of `flown`.
     fn choose(&self, from: &Point, flown: First) -> First {
         let [bank, pitch] = self.target;
         if bank.abs() < STEEP_ENOUGH || pitch - from.attitude[1] < UP_ENOUGH {

@@ -46,9 +46,11 @@ fn an_exponential_approach_has_the_integral_and_times_of_its_formula() {
     let flight =
         track(8.0, [40.0, 0.0], |t| Moment { attitude: [roll(t).to_radians(), 0.0], ..level(t) });
     let q = flight.quality(&LIMITS);
-    // ∫ 40 e^(−t/τ) dt = 40 τ. With steps dt of 0.01 s, the trapezoidal rule exceeds it by the fraction (dt/τ)²/12
+    // the integral of 40° e^(−t/τ) is 40° τ = 20° s. With the sample interval dt of 0.01 s, the trapezoidal rule gives a value
+    // that is larger by the fraction (dt/τ)²/12
     assert!((q.error_integral_deg_s - 20.0).abs() < 20.0 * 4e-5, "{q:?}");
-    // the measured settling time is the time of the last sample outside the band, at most one tick before τ ln(40/1) or τ ln(20)
+    // the measured settling time is the time of the last sample outside the band. The exact times are τ ln(40/1) for 1° and τ
+    // ln(20) for 5 %. The last sample is at most one sample interval earlier
     assert!((q.to_one_deg_s - tau * 40f64.ln()).abs() <= STEP);
     assert!((q.to_five_percent_s - tau * 20f64.ln()).abs() <= STEP);
     assert_eq!(q.overshoot_deg, [0.0, 0.0]);
@@ -70,8 +72,8 @@ fn a_second_order_step_overshoots_as_its_damping_says() {
     });
     let expected = (-std::f64::consts::PI * zeta / damped).exp();
     let q = flight.quality(&LIMITS);
-    // the sample closest to the peak is at most half a tick dt from it, so it is lower by up to about the fraction (ωn dt)²/8 of
-    // the overshoot
+    // the sample closest to the peak is at most half a sample interval dt from it. It is lower than the peak by at most about the
+    // fraction (ω dt)²/8 of the overshoot, with the natural frequency ω
     assert!((q.overshoot_deg[0] / 50.0 - expected).abs() < 3e-4 * expected, "{q:?}");
     assert!((q.overshoot_deg[1] / 20.0 - expected).abs() < 3e-4 * expected, "{q:?}");
 }
@@ -98,8 +100,8 @@ fn what_never_stays_takes_the_whole_flight_and_a_lost_one_counts_as_upside_down(
     assert!(lost.lost && !lost.kept && (lost.to_one_deg_s - 5.0).abs() < 1e-9);
 }
 
-/// The total variation of a sine of amplitude A and frequency f over whole periods T is 4 A f T. Its rate has the mean square
-/// (2π f A)²/2.
+/// A sine of amplitude A and frequency f has the total variation 4 A f T over whole periods of total duration T. The mean square
+/// of its rate is (2π f A)²/2.
 #[test]
 fn a_sine_of_a_surface_travels_four_amplitudes_a_period() {
     let (amplitude, hertz, seconds) = (0.3, 0.5, 8.0);
@@ -120,7 +122,8 @@ fn a_sine_of_a_surface_travels_four_amplitudes_a_period() {
     assert_eq!([q.surface_saturated, q.saturated.throttle], [0.0; 2]);
 }
 
-/// The travel includes the change from the command before the first sample to the first command, if the former is known.
+/// The travel includes the change from the command before the first sample (`before`) to the first command. If `before` is
+/// unknown, the travel starts at the first command.
 #[test]
 fn the_first_change_counts_from_the_command_before() {
     let command = Command { aileron: 0.5, ..Command::IDLE };
@@ -128,7 +131,7 @@ fn the_first_change_counts_from_the_command_before() {
     assert_eq!(flight.quality(&LIMITS).travel.aileron, 0.0);
     let after = Track { before: Some(Command::IDLE), ..flight }.quality(&LIMITS);
     assert_eq!(after.travel.aileron, 0.5);
-    // a change of 0.5 in a tick of 0.01 s is 50 per second, more than the limit of 20
+    // a change of 0.5 in a sample interval of 0.01 s is a rate of 50 per second, more than the limit of 20
     assert!((after.outside_s.slew - STEP).abs() < 1e-9);
 }
 
@@ -206,7 +209,8 @@ fn a_file_that_states_no_stall_has_no_limit_of_it() {
     assert_eq!(limits.load_factor[0], f64::NEG_INFINITY);
 }
 
-/// If the attitude is unknown in the whole flight, both settling times must be NaN, not zero. If only its start is unknown, so
+/// If the attitude is unknown in the whole flight, both settling times must be NaN, not zero. If only the initial attitude is
+/// unknown, the size of the step is unknown. Then only the time to 5 % of the step must be NaN.
 /// is the size of the step, and only the time to 5 % of the step must be NaN.
 #[test]
 fn an_unknown_attitude_has_no_settling_time() {

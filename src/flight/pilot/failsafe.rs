@@ -1,6 +1,6 @@
 //! Failsafes of the pilot, the part of the companion that decides on each command. They act on the loss and the recovery of the
-//! link to the vehicle, on the loss of the setpoints or stick inputs of a client (a ground station or an offboard program), and
-//! on a restart of the vehicle.
+//! link to the vehicle, and on a restart of the vehicle. They also act on the loss of the setpoints or stick inputs of a client
+//! (a ground station or an offboard program).
 
 use std::time::Duration;
 

@@ -94,7 +94,8 @@ impl Autopilot for Pilot {
         if let Some(check) = &mut self.check {
             check.await_authority();
         }
-        // before arming the state may have been constant for a while; its age counts from now on
+        // the measured state of an aircraft at rest may stay constant, so an unchanged state counts as fresh at the time of
+        // arming
         self.estimate.refresh(now);
         self.texts.say(Severity::Notice, format!("armed, {}", mode_name(self.mode)));
         Verdict::Accepted

@@ -11,8 +11,9 @@ use super::timing::Histogram;
 const PRIORITY: i32 = 40;
 /// Period of the wake-up measurement.
 const CYCLE: Duration = Duration::from_millis(10);
-/// Limits of the wake-up latency. At most one wake-up in a hundred may exceed the first limit, and none may exceed the second.
-/// In a control cycle of 10 ms, 8 ms are for the plan; 2 ms remain.
+/// Limits of the wake-up latency. At most one wake-up in a hundred may exceed the first limit, and none may exceed the second. In
+/// a control cycle of 10 ms, a planner (a controller that optimises a sequence of commands) has 8 ms to compute its command. The
+/// other 2 ms remain for the rest of the loop.
 const LATE: (Duration, Duration) = (Duration::from_millis(2), Duration::from_millis(5));
 
 /// Puts this thread, and all threads that it starts, into the scheduling class SCHED_FIFO. A thread of this class runs

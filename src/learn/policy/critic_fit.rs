@@ -1,10 +1,10 @@
 //! Twin critics of a fixed actor, learned from the returns of its simulated flights.
 //!
 //! A planner uses the critics, also in states that the actor alone would not reach. Therefore each flight starts with random
-//! actions for some steps. Then the actor flies for a fixed number of steps, the window. The value of a state is the discounted
-//! sum of the rewards from there to the end of the window (the return), plus the critic's discounted value of the last state.
-//! This is TD(1) over a window, eq. (11) of \[GSFM26\] (see `src/lib.rs`) for a fixed actor. The loss uses errors relative to the
-//! return, because returns are small near the target and a planner must resolve small differences there.
+//! actions for some steps. Then the actor flies for a fixed number of steps, the window. The return is the discounted sum of the
+//! rewards from a state to the end of the window. The value of a state is its return plus the critic's discounted value of the
+//! last state. This is TD(1) over a window, eq. (11) of \[GSFM26\] (see `src/lib.rs`) for a fixed actor. The loss uses errors
+//! relative to the return, because returns are small near the target and a planner must resolve small differences there.
 
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::RngExt as _;

@@ -1,7 +1,9 @@
 //! Names that other programs give to the columns of a table of flight data.
 //!
-//! Sources: `FGOutputTextFile.cpp` of JSBSim (output sections and property names), the topics of PX4 as ulog2csv writes
-//! them, the records of ArduPilot and the messages of MAVLink as `mavlogdump --format csv` writes them (TYPE.field).
+//! Sources:
+//! - `FGOutputTextFile.cpp` of JSBSim: output sections and property names.
+//! - ulog2csv: topics of PX4.
+//! - `mavlogdump --format csv`: records of ArduPilot and messages of MAVLink, as `TYPE.field`.
 
 use crate::mapping::{Mapping, table_rules};
 

@@ -35,11 +35,11 @@ enum Count {
 /// One step of reading a message.
 #[derive(Debug)]
 enum Step {
-    /// A number, with the index of its value if it is requested.
+    /// A number. The index is the place of its value in the decoded message; `None` if it is not requested.
     Number(Number, Option<usize>),
     /// A string, which is skipped.
     Text,
-    /// An array of numbers. For each of its first elements: the index of its value, if it is requested.
+    /// An array of numbers, with a place as in `Number` for each of its first elements.
     Numbers(Number, Count, Vec<Option<usize>>),
     /// An array of strings or messages, which is skipped.
     Each(Count, Vec<Step>),
@@ -119,7 +119,7 @@ fn run(steps: &[Step], cdr: &mut Cdr<'_>, values: &mut [f64]) -> Option<()> {
                 for _ in 0..counted(*count, cdr)? {
                     let before = cdr.left();
                     run(steps, cdr, values)?;
-                    // If an element has no bytes, the message may state any number of them: they are not read one by one.
+                    // Elements without bytes can be stated in any number, so the loop ends at the first one.
                     if cdr.left() == before {
                         break;
                     }

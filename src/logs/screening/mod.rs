@@ -1,9 +1,12 @@
 //! Screening: wrong units, signs and axes, found before anything is computed from a log.
 //!
-//! Each check uses a relation that holds for every aeroplane whatever its coefficients: Euler angles are the integral
-//! of the body rates, a steady turn has V ψ̇ = g tan φ, altitude is the integral of the climb rate, a positive aileron
-//! rolls to the right. A finding names the column and the mapping that corrects it. No column is converted without a
-//! mapping.
+//! Each check uses a relation that holds for every aeroplane whatever its coefficients:
+//! - The Euler angles are the integral of their rates, which follow from the body rates.
+//! - A steady turn has V ψ̇ = g tan φ.
+//! - The altitude is the integral of the climb rate.
+//! - A positive aileron rolls the aircraft to the right.
+//!
+//! A finding names the column and the mapping that corrects it. No column is converted without a mapping.
 
 mod air;
 mod angles;

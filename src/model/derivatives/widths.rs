@@ -2,8 +2,9 @@
 //!
 //! The errors are read from `params/widths/widths.csv`. They combine two sources. One is the tool's errors on aircraft whose
 //! derivatives were identified in flight or measured in a wind tunnel (`params/widths/measured.csv`, with sources). The other is
-//! a prior guess, which counts as much as two aircraft, because few were measured: w² = (2 g² + Σ e²) / (2 + n), with the guess
-//! g and the relative errors e of n aircraft. `cargo run --no-default-features --example derivative_widths` computes the file.
+//! a prior guess, which counts as much as two aircraft, because few were measured. The result is w² = (2 g² + Σ e²) / (2 + n),
+//! with the guess g and the relative errors e of n aircraft. `cargo run --no-default-features --example derivative_widths`
+//! computes the file.
 
 use std::fmt;
 use std::sync::LazyLock;

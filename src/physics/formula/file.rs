@@ -1,6 +1,6 @@
-//! Reader of effect files. An effect file is a TOML file with the formulas of one effect: for each channel (a force or moment)
-//! a `factor` without parameters times a `shape` with parameters. Parameters in which the shapes are linear are coefficients.
-//! The other parameters are shape constants.
+//! Reader of effect files. An effect file is a TOML file with the formulas of one effect. For each channel (a force or moment)
+//! the formula is a `factor` without parameters times a `shape` with parameters. Parameters in which the shapes are linear are
+//! coefficients. The other parameters are shape constants.
 
 use std::collections::BTreeMap;
 

@@ -1,6 +1,6 @@
-//! Sections of the evaluation page on the transient response to a commanded attitude (target): a plot of the error against the
-//! surface travel, a table of all measures, and their definitions. Surface travel is the sum of the magnitudes of all changes of
-//! the surface commands.
+//! Sections of the evaluation page on the transient response to a commanded attitude (target). They contain a plot of the error
+//! against the surface travel, a table of all measures, and their definitions. Surface travel is the sum of the magnitudes of all
+//! changes of the surface commands.
 
 use super::{EvaluationReport, Left, Right, label, with_interval};
 use crate::kit::numbers::number;
@@ -26,7 +26,7 @@ fn by_group(report: &EvaluationReport, anchor: &str, figure: &dyn Fn(&str) -> Fi
     let option =
         |group: &str| ChoiceOption { name: group.replace('_', " "), figures: vec![figure(group)] };
     let groups = report.groups();
-    // the group "all" (the targets of the paper's Table II) comes first, then the other groups
+    // the group "all" (the targets of Table II of T. Guerin et al. 2026, see src/lib.rs) comes first, then the other groups
     let (all, parts): (Vec<&str>, Vec<&str>) = groups.into_iter().partition(|g| *g == "all");
     Figure::Choice(Choice {
         anchor: anchor.into(),

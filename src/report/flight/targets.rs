@@ -1,5 +1,5 @@
-//! Section on the targets (commanded attitudes) of a flight: the path in roll and pitch, and the settled error of each target,
-//! which is the RMS error in the last fifth of its time.
+//! Section on the targets (commanded attitudes) of a flight: the path in roll and pitch, and the settled error of each target.
+//! The settled error is the RMS error in the last fifth of the time of the target.
 
 use crate::flight::FlightReport;
 use crate::flight::verdict::signed;

@@ -1,5 +1,5 @@
-//! Box with the answer of a page on a model's error in free runs (open-loop simulations): how the error changes, which effects
-//! are missing, where the model fails, and the next command.
+//! Box with the answer of a page on a model's error in free runs (open-loop simulations). It states how the error changes, which
+//! effects are missing, where the model fails, and the next command.
 
 use crate::kit::figure::next_command;
 use crate::kit::html::escape;

@@ -1,15 +1,15 @@
-//! A table of numbers. Each cell is shaded with its own intensity.
+//! A figure with a table of numbers. The background of each cell is shaded, more strongly for a greater weight of the cell.
 
 use crate::kit::html::escape;
 
-/// Table of numbers. Each cell is shaded with its own intensity.
+/// Table of numbers with shaded cells.
 #[derive(Clone, Debug)]
 pub struct Grid {
     /// Title of the figure.
     pub title: String,
     /// Quantity and unit of the numbers.
     pub unit: String,
-    /// Name of the rows, in the corner of the table.
+    /// Heading of the column of row labels.
     pub corner: String,
     /// Column heads: a symbol and its meaning.
     pub columns: Vec<(String, String)>,
@@ -17,7 +17,7 @@ pub struct Grid {
     pub rows: Vec<GridRow>,
 }
 
-/// One row of cells.
+/// A row of the table.
 #[derive(Clone, Debug)]
 pub struct GridRow {
     /// Name of the row.
@@ -26,12 +26,12 @@ pub struct GridRow {
     pub cells: Vec<GridCell>,
 }
 
-/// One cell of a row.
+/// A cell of the table.
 #[derive(Clone, Debug)]
 pub struct GridCell {
     /// Text of the cell; may be empty.
     pub text: String,
-    /// Intensity of the shading, 0..1.
+    /// Strength of the shading: 0 for none, 1 for the strongest. Other values are limited to this range.
     pub weight: f64,
 }
 

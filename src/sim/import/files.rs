@@ -55,7 +55,8 @@ pub(super) fn airframe(
     let incidence = polar.incidence(lift);
     let limits = incidence_limits(incidence, polar.incidence(lift_max));
     let descent = descent(subject, polar, thrust, [incidence, lift]);
-    // the lower pitch limit of a glider is relative to its descent angle
+    // 10° to 15° below the pitch of level flight, or of the idle glide if full throttle cannot hold level flight; never above
+    // −15°
     let lowest = (5.0 * ((incidence - descent).to_degrees() / 5.0 - 2.0).floor()).min(-15.0);
     out += &format!(
         "[controls.throttle]\nlag_s = {{ value = {lag:.4}, source = \"step of the command\" }}\n\n{limits}\
@@ -68,7 +69,8 @@ pub(super) fn airframe(
     out
 }
 
-/// Descent angle at the reference airspeed with idle throttle, rad. Zero if full throttle holds level flight. `alpha` and
+/// Descent angle of the idle glide at the reference airspeed, rad. Zero if the thrust at full throttle is at least the drag of
+/// level flight. `alpha` and `lift` are the angle of attack (rad) and the lift coefficient of level flight.
 /// `lift` are the angle of attack (rad) and the lift coefficient of level flight.
 fn descent(subject: &Subject, polar: &Polar, thrust: &[Estimate], [alpha, lift]: [f64; 2]) -> f64 {
     let v = subject.start.airspeed_mps;

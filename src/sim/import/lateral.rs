@@ -1,5 +1,5 @@
-//! Determines lateral derivatives of a JSBSim aircraft by finite differences: how the stability derivatives depend on the
-//! lift coefficient, and how the aileron derivatives depend on the angle of attack.
+//! Determines lateral derivatives of a JSBSim aircraft by finite differences. The stability derivatives are determined as
+//! functions of the lift coefficient, the aileron derivatives as functions of the angle of attack.
 
 use greylag_sitl::plant::{Inputs, PlantError, Start};
 

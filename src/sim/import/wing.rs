@@ -4,7 +4,8 @@ use greylag_sitl::plant::Plant;
 
 use super::ImportError;
 
-/// A reference dimension of the wing of `plant`, in the unit of the JSBSim property `property`. The error calls it `what`.
+/// A reference dimension of the wing of `plant`, in the unit of the JSBSim property `property`. If the value is not positive and
+/// finite, the error names the dimension as `what`.
 pub(super) fn measure(
     plant: &mut Plant,
     what: &'static str,

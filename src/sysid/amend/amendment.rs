@@ -1,5 +1,5 @@
-//! Amends a model with flights: re-estimates ("tunes") its coefficients, then adds effects that improve the prediction of
-//! held-out flights, which are not fitted.
+//! Amends a model with flights. First its coefficients are re-estimated ("tuned"). Then effects are added that improve the
+//! prediction of held-out flights, which are not used for the fit.
 //!
 //! An effect is a group of model terms with its coefficients, from the catalogue (the effects that the program knows) or from an
 //! effect file. A free run is an open-loop simulation of the model along a recorded flight. Its horizon is its duration.
@@ -52,9 +52,12 @@ impl Added {
     }
 }
 
-/// What happens to an effect that fails a check. The checks fail if the effect does not reduce the error on held-out flights by
-/// more than 1 % or its fit does not converge. They also fail if a fitted coefficient is at a bound, no coefficient differs from
-/// zero significantly, or the flights contradict each other.
+/// What happens to an effect that fails one of these checks:
+/// - A held-out flight is long enough for a free run, and the effect reduces the error of the free runs by more than 1 %.
+/// - The fit with the effect converges. This check is waived if the error falls below half of the error without the effect.
+/// - No fitted coefficient of the effect is at a bound.
+/// - At least one coefficient of the effect differs significantly from zero.
+/// - The estimate from a single flight does not contradict the estimate from all flights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refused {
     /// The effect is left out of the model.
@@ -84,17 +87,19 @@ pub struct Options {
     pub refused: Refused,
     /// Horizons of the free runs, s.
     pub horizons_s: Vec<f64>,
-    /// Whether alternatives to the model's integrator, force axes and air density (conventions) are tried.
+    /// Whether other conventions than those of the model are tried. A convention is the choice of integrator, force axes or air
+    /// density.
     pub conventions: bool,
-    /// Trims and misalignment angles that are estimated for each flight, in addition to its sensor errors.
+    /// Constants that are estimated for each flight in addition to its sensor errors: misalignment angles of the sensor axes, and
+    /// trims (constants added to force and moment coefficients, and a relative change of the thrust).
     pub per_flight: PerFlight,
-    /// The fit of the model without added effects to the same flights, if it is known ([`tune`](super::tune)); `None` to
-    /// compute it.
+    /// The fit of the model without added effects to the same flights, from [`tune`](super::tune). If it is `None`, it is
+    /// computed.
     pub tuned: Option<Fit>,
 }
 
 impl Options {
-    /// Fits are compared at the longest horizon up to this one, s.
+    /// Fits are compared at the longest horizon that does not exceed this value, s.
     pub const JUDGED_AT_S: f64 = JUDGED_AT_S;
 }
 
@@ -125,15 +130,15 @@ pub struct Amended {
 }
 
 impl Amended {
-    /// Names of the coefficients that are zero because an added effect replaces their model term. Each name is paired with the
-    /// identifier of that effect.
+    /// The coefficients that are zero because an added effect replaces their model term. Returns the name of each coefficient and
+    /// the identifier of that effect.
     pub fn dropped(&self) -> Vec<(String, &'static str)> {
         dropped(&self.tuned, &self.model)
     }
 }
 
-/// Names of the coefficients of `before` whose model term is replaced by an effect of `after` and by no effect of `before`.
-/// Each name is paired with the identifier of that effect.
+/// The coefficients whose model term is replaced by an effect in `after` but by none in `before`. Returns the name of each
+/// coefficient and the identifier of the effect.
 fn dropped(before: &GreyBox, after: &GreyBox) -> Vec<(String, &'static str)> {
     let still = |name: &str| before.replaced(name).is_none();
     let named = before.coefficients().iter().filter(|c| still(&c.name));
@@ -237,12 +242,12 @@ fn settings(options: &Options) -> Settings {
     }
 }
 
-/// Horizon at which the amended model is compared with the model as given, s. `given` are the scores of the model as given on
-/// the held-out flights.
+/// Horizon at which the free-run errors of the amended model are compared with those of the given model, s. `given` holds the
+/// errors of the given model over the held-out flights, one entry per horizon.
 fn compared_at(prior: Prior, given: &[HorizonScore]) -> Option<f64> {
     match prior {
         Prior::File => judge::repeated_at(given),
-        // without a prior the given coefficients are guesses, and a single run at the horizon suffices to replace them
+        // without a prior the given coefficients are only guesses, so a horizon that a single run reaches is allowed
         Prior::Bounds => judge::judged_at(given),
     }
 }
@@ -255,9 +260,9 @@ struct Right {
     notes: Vec<String>,
 }
 
-/// Corrects `flights` for the misalignment of the sensor axes and the sensor errors that the file of `model` states, unless the
-/// fit estimates the misalignment. If the file states trims (coefficient offsets of a single flight) for any of `flights`, trims
-/// are estimated for every flight.
+/// Corrects `flights` for the sensor errors and the misalignment of the sensor axes that the file of `model` states. They are not
+/// corrected if the fit estimates the misalignment. If the file states trims for any of `flights`, trims are estimated for every
+/// flight.
 fn right(model: &GreyBox, flights: &[Reconstruction], mut asked: PerFlight) -> Right {
     let mut notes = Vec::new();
     let (flights, named) = match asked.askew_deg {
@@ -296,7 +301,7 @@ pub(super) fn joined(model: &mut GreyBox, added: &Added) -> Result<(), AmendErro
 fn usual_start(about: &Description) -> Vec<f64> {
     let starts = about.entry.map_or(&[][..], |e| e.starts);
     let nearest = |c: &Coefficient| 0.0_f64.clamp(c.bounds.0, c.bounds.1);
-    // the first entry in the list of an effect file is the default; in the catalogue, the middle entry is typical
+    // an effect from an effect file starts at the first entry of its list, an effect of the catalogue at the middle entry
     let own = Kind::from_id(about.id).is_some_and(|kind| kind.written().is_some());
     let listed = starts.get(if own { 0 } else { starts.len() / 2 }).map(|s| s.to_vec());
     listed.unwrap_or_else(|| about.coefficients.iter().map(nearest).collect())

@@ -1,5 +1,7 @@
-//! Fitted constants that are written to the model's file: misalignment angles of the sensors, trim coefficients and sensor
-//! errors. The constants of a flight apply to this flight only. Those of the installation apply to all flights.
+//! Fitted constants that are written to the model's file: misalignment angles of the sensors, sensor errors and trims. Trims are
+//! constants that are added to the force and moment coefficients in one flight, and a relative change of the thrust. The
+//! constants of the installation apply to all flights. An angle or sensor error in a flight's own entry replaces that of the
+//! installation.
 
 use super::flight::{OFFSETS, Own, SENSORS, SKEW};
 use crate::amend::error::AmendError;
@@ -19,7 +21,7 @@ const INSTALLED: [usize; 3] = [0, 4, 5];
 pub(super) struct Learned<'a> {
     /// Name of the flight, from its log file.
     pub name: &'a str,
-    /// Values of the constants.
+    /// Estimates of the flight's constants.
     pub own: &'a Own,
     /// Standard deviations of the constants, in the order of [`Own::unknowns`].
     pub sd: &'a [f64],
@@ -36,8 +38,8 @@ impl Learned<'_> {
     }
 }
 
-/// Checks that the flights `names` can have constants as requested by `asked`. The model's file identifies the constants of a
-/// flight by the flight's name.
+/// Checks that the flights `names` have different names if `asked` requests misalignment angles or trims. The model's file
+/// identifies the constants of a flight by its name.
 ///
 /// # Errors
 /// Two flights have the same name.
@@ -91,8 +93,9 @@ fn without_trims(known: &Known) -> Known {
 /// The constants of the installation after a fit to `flights`: mean misalignment angles if the fit has estimated any, and mean
 /// sensor errors. Means that do not differ significantly from zero are omitted.
 ///
-/// A fit with misalignment angles replaces the constants `before`. A fit without them has corrected its flights with `before`.
-/// Its sensor errors are therefore added to those of `before`, and the angles of `before` are kept.
+/// If the fit estimates misalignment angles, its results replace the constants `before`. Otherwise its flights were already
+/// corrected with `before`. The mean sensor errors of the fit are then added to those of `before`, and the angles of `before` are
+/// kept.
 fn installation(
     before: Option<&FlightConstants>,
     flights: &[Learned],

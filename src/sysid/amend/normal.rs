@@ -1,8 +1,8 @@
 //! Derivatives and normal equations of the output-error fit.
 //!
 //! A shot is a short open-loop simulation (free run) along a part of a flight. The unknowns of the fit are the free coefficients
-//! of the model, constants of each flight (sensor errors, misalignment angles, trims), and the errors of each shot's initial
-//! state. The latter are eliminated from the normal equations.
+//! of the model, constants of each flight (sensor errors, misalignment angles, trims), and errors of the initial state of each
+//! shot. The initial errors are eliminated from the normal equations.
 
 use std::borrow::Cow;
 

@@ -2,9 +2,9 @@
 //! baseline with which the free runs (open-loop simulations) of aircraft models are compared.
 //!
 //! With the states x and the deflections u of sample k and of the samples before it, the model is
-//! ẋ(k) = Σ A(i) x(k − i) + B(i) u(k − i) + c over i = 0 to order − 1, and x(k + 1) = x(k) + ẋ(k) Δt (Ljung, System
-//! Identification, 1999, section 4.2). A, B and c minimise the sum of the squared one-step errors. Unlike in the reference, the
-//! states are not measurements but come from flight-path reconstruction, which removes most of their noise.
+//! ẋ(k) = Σ A(i) x(k − i) + B(i) u(k − i) + c over i = 0 to order − 1, and x(k + 1) = x(k) + ẋ(k) Δt.
+//! Source: Ljung, System Identification, 1999, section 4.2. A, B and c minimise the sum of the squared one-step errors. Unlike in
+//! the reference, the states are not measurements but come from flight-path reconstruction, which removes most of their noise.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;

@@ -1,5 +1,5 @@
-//! Corrections of free runs, in which the model's rates get an additional term: a disturbance that an observer estimated before
-//! the run, or a linear function of states and deflections (a linear residual).
+//! Corrections of free runs. A correction is an additional term in the model's rates. It is a disturbance that an observer
+//! estimated before the run, or a linear function of states and deflections (a linear residual).
 
 use greylag_model::{GreyBox, Memory};
 

@@ -1,5 +1,5 @@
-//! Forecasts that use no aerodynamic model, as baselines for the free runs (open-loop simulations) of a model: the state is held,
-//! the flight goes straight on, or a linear model (ARX) predicts it.
+//! Forecasts that use no aerodynamic model, as baselines for the free runs (open-loop simulations) of a model. Either the state
+//! is held, or the flight goes straight on, or a linear model (ARX) predicts the state.
 
 use serde::Serialize;
 

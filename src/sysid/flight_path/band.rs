@@ -1,9 +1,10 @@
 //! Solver for the normal equations of the flight-path smoother. They are block-tridiagonal in time (the unknowns of an instant
 //! are coupled with those of the next one) and bordered by constants such as sensor errors.
 //!
-//! The right-hand side is stored as the last column of the constants. Elimination of an instant replaces this column by the
-//! right-hand side of the constants' equations, and the last entry of the corner by the minimum of the sum of squares. A stretch
-//! of flight is eliminated from both ends towards its middle in parallel. The number of operations is the same as in sequence.
+//! The right-hand side is stored as the last column of the constants. The elimination of an instant replaces this column by the
+//! right-hand side of the constants' equations. It replaces the last entry of the corner by the minimum of the sum of squares. A
+//! stretch of flight is eliminated from both ends towards its middle in parallel. The number of operations is the same as in
+//! sequence.
 
 /// Square block of one instant's unknowns.
 pub type Block<const N: usize> = [[f64; N]; N];

@@ -2,9 +2,9 @@
 //!
 //! Rare errors are gains of gyros, accelerometers and vanes, an offset of airspeed or heading, and a delay of many samples. If
 //! all of them had wide priors, the biases would be less certain in every flight. At first, gains and offsets are therefore held
-//! at their prior means, and delays are estimated with a narrow prior. An error is freed, which means that it gets a wide prior,
-//! if the data contradict its prior mean: its estimate without its prior differs from the prior mean significantly and by a
-//! relevant size. This is a score test with the path and all other constants (sensor errors, wind, Earth's rate) fitted (Klein
+//! at their prior means, and delays are estimated with a narrow prior. An error gets a wide prior (it is freed) if the data
+//! contradict its prior mean. This is the case if its estimate without its prior differs from the prior mean significantly and by
+//! a relevant size. This is a score test with the path and all other constants (sensor errors, wind, Earth's rate) fitted (Klein
 //! and Morelli, Aircraft System Identification, section 5.3.3).
 
 use crate::flight_path::equations::{Found, Problem};

@@ -1,5 +1,5 @@
-//! Simulation of the learned model from recorded states (rollouts), and the gradient of the training objective by
-//! backpropagation through the simulation: eqs. (20) and (22) of the paper \[GSFM26\] (see `src/lib.rs`).
+//! Simulation of the learned model from recorded states (rollouts). The module also computes the gradient of the training
+//! objective by backpropagation through the simulation. Source: eqs. (20) and (22) of \[GSFM26\] (see `src/lib.rs`).
 //!
 //! The state rate of the model is F_p + F_a. The prior F_p is a physical model whose coefficients may be trained. The residual
 //! F_a is a neural network. A block of rollouts is computed at once, one in each lane of a SIMD vector. The forward pass

@@ -1,6 +1,6 @@
-//! Decides whether a model keeps the constants of the installation that its fit has estimated: sensor errors, and the
-//! misalignment of the measured axes, that all flights of the aircraft have in common. The error of free runs over held-out
-//! flights, which the fit does not use, decides.
+//! Decides whether a model keeps the fitted constants of the installation: sensor errors and misalignment angles that all flights
+//! of the aircraft have in common. The decision depends on the error of free runs over held-out flights, which the fit does not
+//! use.
 
 use std::sync::Arc;
 

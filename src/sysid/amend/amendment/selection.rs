@@ -113,8 +113,8 @@ impl Ask<'_> {
     /// Fits all effects with starting values jointly, and leaves out those with implausible estimates. `best` is the fit without
     /// added effects. Returns the remaining effects, their fit and its free-run errors on held-out flights.
     ///
-    /// If the model lacks two effects, the error due to one can hide the gain of adding the other. Tests of single effects would
-    /// miss the latter. Returns `None` if a fit fails, if fewer than two effects remain, or if the held-out error does not
+    /// If the model lacks two effects, the error due to one can hide the gain of adding the other. A test of the other effect
+    /// alone would then fail. Returns `None` if a fit fails, if fewer than two effects remain, or if the held-out error does not
     /// decrease by more than 1 %.
     fn together(
         &self,

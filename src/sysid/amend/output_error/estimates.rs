@@ -1,5 +1,5 @@
 //! Results of a finished output-error fit: estimates with their intervals, estimates from each flight alone, constants of each
-//! flight (sensor errors, misalignment angles, trims), and notes for the user.
+//! flight, and notes for the user. The constants of a flight are sensor errors, misalignment angles and trims.
 
 use std::sync::Arc;
 

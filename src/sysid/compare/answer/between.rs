@@ -1,5 +1,5 @@
-//! Summary of a comparison of models: the error of the first model in free runs (simulations from recorded states), and the
-//! errors of the other models relative to it.
+//! Summary of a comparison of models. It states the error of the first model in free runs (simulations from recorded states), and
+//! the errors of the other models relative to it.
 
 use super::{ANSWER_S, Answer, Seen, Stage, Subject, Way};
 use crate::compare::forecast::ForecastResult;

@@ -1,11 +1,11 @@
 //! Test whether misaligned axes of the sensors explain the residual better than missing effects (physical contributions to forces
 //! and moments).
 //!
-//! If the board with the sensors is mounted with a pitch of 3°, part of every roll appears as yaw, as with a product of
-//! inertia, and part of lift as drag. The flight-path reconstruction cannot show the misalignment, because all quantities
-//! that the board measures rotate equally. The test therefore uses the aerodynamics. If the model is not adequate, the
-//! search is repeated with free misalignment angles. The Bayesian information criterion compares both explanations under
-//! the same noise: their residuals and their numbers of constants.
+//! Example: the board with the sensors is mounted with a pitch of 3°. Then part of every roll appears as yaw, as with a product
+//! of inertia. Part of the lift appears as drag. The flight-path reconstruction cannot show the misalignment, because all
+//! quantities that the board measures rotate equally. The test therefore uses the aerodynamics. If the model is not adequate, the
+//! search is repeated with free misalignment angles. The Bayesian information criterion compares both explanations under the same
+//! noise: their residuals and their numbers of constants.
 
 use crate::diagnose::answer::result::Verdict;
 use crate::diagnose::answer::run::verdict;

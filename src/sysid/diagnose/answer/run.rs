@@ -1,5 +1,5 @@
-//! The diagnosis of a model: which effects (groups of model terms) of a catalogue does it lack according to recorded flights?
-//! This module prepares the flights, runs the search and assembles the result.
+//! The diagnosis of a model finds the effects (groups of model terms) of a catalogue that the model lacks according to recorded
+//! flights. This module prepares the flights, runs the search and assembles the result.
 //!
 //! An effect that the search has found is refused if a check fails, and otherwise asserted. A channel is a force or a moment.
 

@@ -1,9 +1,10 @@
-//! Search for a formula of a missing effect (a physical contribution to forces and moments) in which controls pass through a
-//! first-order lag.
+//! Search for a formula of a missing effect in which controls act through a first-order lag. An effect is a physical contribution
+//! to forces and moments.
 //!
-//! A form is a function of some variables; a formula is a sum of forms with coefficients. The forms of the library depend only on
-//! present values. If a moment follows an engine or a flap with a lag, the library's formula contains the present control. It
-//! then leaves a residual that is proportional to the rate of the control, which no form of the library contains.
+//! A form is a function of some variables. A formula is a sum of forms with coefficients. The library is a set of forms that
+//! depend only on present values. A first search with these forms yields an unlagged formula. If a moment follows an engine or a
+//! flap with a lag, this formula contains the present control. It then leaves a residual that is proportional to the rate of the
+//! control. No form of the library can represent this residual.
 
 use super::forward::{Ask, Climbed, candidates};
 use super::library::{self, CONTROLS, Form};
@@ -11,8 +12,8 @@ use greylag_model::GreyBox;
 use greylag_physics::Channel;
 use greylag_physics::formula::Variable;
 
-/// The lagged forms that are tried: lags of the controls in the library's formula `library`, and lags of all controls in the
-/// channels `doubted` (forces or moments in which this formula leaves a residual).
+/// The lagged forms to try: a lag of each control that the unlagged formula `library` contains, and lags of all controls in the
+/// channels `doubted`. These are the forces or moments in which the formula leaves a residual.
 pub(super) fn forms(library: &Climbed, doubted: &[Channel]) -> Vec<Form> {
     let mut all: Vec<Form> = Vec::new();
     for term in &library.terms {
@@ -29,8 +30,8 @@ pub(super) fn forms(library: &Climbed, doubted: &[Channel]) -> Vec<Form> {
     kept
 }
 
-/// Repeats the search with three kinds of forms: `lags`, those of the library's formula, and those that the flights cannot
-/// distinguish from the formula's first term. `None` if the model cannot be evaluated over the flights.
+/// Repeats the search. The candidates are the lagged forms `lags`, the forms of the unlagged formula `library`, and the forms
+/// that the flights cannot distinguish from its first term. `None` if the model cannot be evaluated over the flights.
 pub(super) fn climb(
     ask: &Ask,
     library: &Climbed,

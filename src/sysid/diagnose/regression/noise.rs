@@ -1,9 +1,9 @@
 //! Estimate of the noise of each channel (a force or a moment): a filter that whitens it, its variance, and its whitened values.
 //!
 //! The data are means over windows, which are short stretches of flight. A cell contains the windows of one channel of one
-//! flight. A block is a stretch of about 4 s. A column is a regressor. The noise is what a ridge regression of the model's
-//! residual leaves unexplained if all coefficients of the model and all candidates (physical effects that it may lack) are
-//! regressors.
+//! flight. A block is a stretch of about 4 s. A column is a regressor. A candidate is a physical effect that the model may lack.
+//! A ridge regression explains the model's residual by all coefficients of the model and all candidates. The noise is the part
+//! that it leaves unexplained.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 

@@ -1,6 +1,6 @@
-//! The regression of the residual on the columns (regressors) of the candidates (physical effects that the model may lack), after
-//! the nuisance parameters were projected out of both (Frisch–Waugh–Lovell). Its Gram matrices are computed for each block, a
-//! stretch of about 4 s of a flight.
+//! The regression of the residual on the columns (regressors) of the candidates. A candidate is a physical effect that the model
+//! may lack. The nuisance parameters are first projected out of residual and columns (Frisch–Waugh–Lovell). The Gram matrices of
+//! the regression are computed for each block, a stretch of about 4 s of a flight.
 //!
 //! Residual and columns are whitened: filtered so that the noise becomes white. The prior of the nuisance parameters acts like
 //! further rows, called its pseudo-observations.

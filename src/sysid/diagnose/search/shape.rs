@@ -1,5 +1,5 @@
-//! Lack-of-fit test: regression of the residual on products of states and deflections (the terms). If an effect (a physical
-//! contribution to forces and moments) was added and the terms still explain part of the residual, the formula of the effect
+//! Lack-of-fit test of an added effect (a physical contribution to forces and moments). It is a regression of the residual on
+//! products of states and deflections (the terms). If the terms still explain part of the residual, the formula of the effect
 //! differs from the true one.
 //!
 //! The flexible model of [`remainder`](super::remainder) must generalise to other flights and detects only large errors. This

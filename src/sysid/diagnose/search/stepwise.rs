@@ -1,6 +1,6 @@
-//! Forward selection: adds the candidate (a physical effect that the model may lack) with the most evidence to the model if it
-//! passes the checks, and repeats the search with the new model until no candidate passes. Candidates that fail a check are
-//! refused. A round is one such search, with the model linearised over the flights.
+//! Forward selection. A candidate is a physical effect that the model may lack. The candidate with the most evidence is added to
+//! the model if it passes the checks. The search is then repeated with the new model until no candidate passes. Candidates that
+//! fail a check are refused. A round is one such search, with the model linearised over the flights.
 
 mod examine;
 mod found;

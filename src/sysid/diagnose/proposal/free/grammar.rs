@@ -1,5 +1,5 @@
-//! Expressions of at most nine nodes that may describe an unknown effect (a physical contribution to forces and moments):
-//! functions of one variable, products of up to three of these functions, and functions of a sum of two variables.
+//! Expressions that may describe an unknown effect (a physical contribution to forces and moments). They have at most nine nodes.
+//! They are functions of one variable, products of up to three of these functions, and functions of a sum of two variables.
 //!
 //! An atom is one of these functions. Shape constants are the constants inside functions, for example c in tanh(v/c).
 
