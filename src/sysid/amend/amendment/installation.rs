@@ -8,7 +8,7 @@ use crate::amend::judge::{self, IMPROVED, Judge};
 use crate::amend::learned;
 use crate::amend::output_error::Fit;
 use crate::compare::HorizonScore;
-use crate::per_flight::SensorErrors;
+use crate::per_flight::{PerFlight, SensorErrors};
 use greylag_model::{FlightConstants, GreyBox};
 
 /// Decision on the sensor errors that the fitted flights have in common.
@@ -16,55 +16,53 @@ use greylag_model::{FlightConstants, GreyBox};
 pub(super) struct Sensors {
     /// Whether they are kept as errors of the installation.
     keep: bool,
+    /// Whether the fit has estimated the misalignment of the axes, so that it did not use the installation of the model before it.
+    anew: bool,
     /// Note on the decision; `None` if the flights have no such errors in common.
     pub(super) note: Option<String>,
 }
 
 impl Sensors {
     /// Decides from `fit`, the fit of the model `given` without added effects. The sensor errors are kept if they lower the
-    /// held-out error by at least the fraction `IMPROVED`. If `asked` is `Kept`, they are kept unless they raise it.
-    pub(super) fn decided(
-        asked: SensorErrors,
-        given: &GreyBox,
-        fit: &Fit,
-        judge: &Judge,
-    ) -> Sensors {
+    /// held-out error by at least the fraction `IMPROVED`. If `asked` has `SensorErrors::Kept`, they are kept unless they raise it.
+    pub(super) fn decided(asked: &PerFlight, given: &GreyBox, fit: &Fit, judge: &Judge) -> Sensors {
+        let anew = asked.angles() > 0;
         let before = given.known.installation.as_ref();
         let after = fit.model.known.installation.as_ref();
         let words = after.and_then(|after| learned::sensors_in_words(before, after));
-        let Some(words) = words else { return Sensors { keep: true, note: None } };
+        let Some(words) = words else { return Sensors { keep: true, anew, note: None } };
         let errors = judge::judged(&judge.scores(&fit.model))
-            .zip(judge::judged(&judge.scores(&without_sensors(&fit.model, given))))
+            .zip(judge::judged(&judge.scores(&without_sensors(&fit.model, given, anew))))
             .filter(|(a, b)| !a.is_nan() && !b.is_nan());
-        let least = match asked {
+        let least = match asked.sensors {
             SensorErrors::Kept => 0.0,
             SensorErrors::Judged | SensorErrors::Dropped => IMPROVED,
         };
         let keep = errors.is_some_and(|(with, without)| with <= (1.0 - least) * without);
         let found = format!("The fitted flights have sensor errors in common ({words})");
-        Sensors { keep, note: Some(note(&found, errors, keep)) }
+        Sensors { keep, anew, note: Some(note(&found, errors, keep)) }
     }
 
     /// Removes the common sensor errors from the model of `fit`, unless they are kept. `given` is the model before the fit.
     pub(super) fn apply(&self, fit: &mut Fit, given: &GreyBox) {
         if !self.keep {
-            fit.model = without_sensors(&fit.model, given);
+            fit.model = without_sensors(&fit.model, given, self.anew);
         }
     }
 }
 
 /// Returns `fitted` with the sensor errors of `given` in place of the estimated ones. If the fit has estimated the
-/// misalignment, the result has no sensor errors, because such a fit does not use those of `given`.
-fn without_sensors(fitted: &GreyBox, given: &GreyBox) -> GreyBox {
+/// misalignment (`anew`), the result has no sensor errors, because such a fit does not use those of `given`.
+fn without_sensors(fitted: &GreyBox, given: &GreyBox, anew: bool) -> GreyBox {
     let mut bare = fitted.clone();
     let known = Arc::make_mut(&mut bare.known);
-    let before = given.known.installation.as_ref();
-    let axes = known.installation.as_ref().and_then(|own| own.axes_deg);
-    let turned = axes.is_some() && axes != before.and_then(|b| b.axes_deg);
-    known.installation = match (turned, known.installation.take()) {
-        (true, Some(own)) => Some(FlightConstants { sensors: None, ..own }),
-        _ => before.cloned(),
+    known.installation = match anew {
+        true => known.installation.take().filter(|own| own.axes_deg.is_some()),
+        false => given.known.installation.clone(),
     };
+    if let Some(own) = known.installation.as_mut().filter(|_| anew) {
+        own.sensors = None;
+    }
     bare
 }
 

@@ -253,7 +253,7 @@ impl Ask<'_> {
 
     /// Returns `fit`, a fit of `model`, after the decision on common sensor errors ([`Ask::sensors`]) was applied to it.
     fn with_sensors(&self, mut fit: Fit, model: &GreyBox) -> Fit {
-        let asked = self.options.per_flight.sensors;
+        let asked = &self.options.per_flight;
         let decided = self.sensors.get_or_init(|| Sensors::decided(asked, model, &fit, self.judge));
         decided.apply(&mut fit, model);
         fit
