@@ -147,7 +147,10 @@ fn page(
 ) -> Result<String> {
     let failing = compare(models, flights, &compare::Options::default(), progress)?;
     let report = DiagnosisReport {
-        title: format!("What {} lacks", diagnosis.model),
+        title: match diagnosis.effects.iter().any(|e| e.asserted) {
+            true => format!("What {} lacks", diagnosis.model),
+            false => format!("Does {} lack anything?", diagnosis.model),
+        },
         diagnosis,
         answer: Some(answer),
         failing: Some(&failing),

@@ -79,26 +79,25 @@ impl EvaluationReport<'_> {
             let mut rows = Vec::new();
             for e in self.evaluations {
                 let Some(score) = e.score(group) else { continue };
-                let ours = Value { value: score.iqm_deg, ci95: score.iqm_ci95_deg };
+                let ours = Value { value: score.mean_deg, ci95: score.mean_ci95_deg };
                 rows.push(whisker(label(e, self.evaluations), Style::Actual, ours));
                 if let Some(p) = published(&e.controller, group) {
                     let name = format!("{} in the paper", p.controller);
-                    rows.push(whisker(name, Style::Measured, p.iqm_deg));
+                    rows.push(whisker(name, Style::Measured, p.mean_deg));
                 }
             }
             Figure::Whiskers(Whiskers {
                 title: group.replace('_', " "),
-                unit: "settled error, °, interquartile mean".into(),
+                unit: "settled error, °, mean".into(),
                 scale: Scale::Log { floor: 1e-4 },
                 lines: Vec::new(),
                 legend: String::new(),
                 rows,
             })
         });
-        let note = "Interquartile mean of the settled error (mean of roll and pitch RMSE over the last fifth \
+        let note = "Mean of the settled error (mean of roll and pitch RMSE over the last fifth \
                     of ten seconds) with its 95 % bootstrap interval, over the targets here, over ten \
-                    policies in the paper (Table XI: true frozen prior), on a scale of decades. \
-                    The box has the plain mean.";
+                    policies in the paper (Table XI: true frozen prior), on a scale of decades.";
         Section::new("Settled error", note, figures.collect())
     }
 

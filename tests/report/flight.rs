@@ -149,11 +149,15 @@ fn the_first_sentence_says_how_the_envelope_was_kept() {
     (limits.airspeed_mps, limits.slew_per_s) = ([5.0, 45.0], 1e3);
     let mut report = report_synthetic::report(&flight);
     report.envelope = Some(EnvelopeFlown { limits, flying_from_mps: 6.0 });
-    let (outcome, _) = verdict(&report);
+    let (outcome, first) = verdict(&report);
     assert_eq!(outcome, Outcome::Missed);
+    assert!(
+        first.starts_with("Outside the envelope for 0.500 s (load factor 0.500 s); "),
+        "{first}"
+    );
     // a line each on the page, all of them in the one line of a terminal
     let (line, html) = (report.page_sentence(), report.page().render());
-    for part in ["Outside the envelope for 0.500 s (load factor 0.500 s)", "Latency"] {
+    for part in ["Load factor 1.50 to 3.00 of 2.20", "Latency"] {
         assert!(html.contains(&format!("<li>{part}")), "{part}");
     }
     // beside the word, why; and what to do next
@@ -166,7 +170,7 @@ fn the_first_sentence_says_how_the_envelope_was_kept() {
     );
     let sentence = line;
     for part in
-        ["outside the envelope for 0.500 s (load factor 0.500 s)", "to 3.00 of 2.20", "latency"]
+        ["Outside the envelope for 0.500 s (load factor 0.500 s)", "to 3.00 of 2.20", "latency"]
     {
         assert!(sentence.contains(part), "{part}: {sentence}");
     }
@@ -215,7 +219,10 @@ fn the_first_sentence_says_what_happened() {
     cycles.push(Cycle { time_s: 60.0, duration_us: 10_000.1 });
     cycles.push(Cycle { time_s: 60.01, duration_us: 10_000.0 });
     let sentence = format!("Flew as commanded: 2 of 2 targets; {}", worst.replace("0.05", "0.04"));
-    assert_eq!(verdict(&report), (Outcome::Missed, sentence));
+    assert_eq!(verdict(&report), (Outcome::Late, sentence));
+    let cycles = report.timing.as_ref().unwrap().cycles.len();
+    let said = format!("Reached, but this computer was late in 1 of {cycles} cycles");
+    assert!(report.page().render().contains(&said));
     assert!(report.page_sentence().contains("; 1 late cycle of the companion"));
 
     report.timing = None;

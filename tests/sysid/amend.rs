@@ -256,7 +256,7 @@ fn the_command_writes_a_model_that_every_command_reads() {
     let text = String::from_utf8_lossy(&said.stdout);
     assert!(said.status.success(), "{text}{}", String::from_utf8_lossy(&said.stderr));
     // tuning and effect apart, said once
-    assert_eq!(text.matches(" with actuator_lag (another −").count(), 1, "{text}");
+    assert_eq!(text.matches(" with actuator_lag (a further −").count(), 1, "{text}");
     assert!(!text.contains("as well the error"), "{text}");
     assert_eq!(*model_before, std::fs::read(MODEL).unwrap());
     let written = out.join("model.toml");

@@ -10,6 +10,8 @@ use greylag_sysid::compare::{ChannelId, Comparison, ModelResult};
 const MULTIPLE: f64 = 10.0;
 /// Smallest share that an effect is taken to leave. Smaller shares are uncertain, and the ratio to them would be random.
 const LEAST: f64 = 1e-4;
+/// Share above which the sentence on an added effect names the channel in which most is left.
+const STATED: f64 = 0.005;
 /// Number of channels that are forces and moments, the first of [`ChannelId::ALL`].
 const LOADS: usize = 6;
 
@@ -60,13 +62,27 @@ pub(crate) fn of_added(
     let (names, with) = (effects.join(" and "), percent(after));
     let shares = match tuned {
         Some(tuned) => format!(
-            "{} % unexplained when tuned, {with} % with {it} ({} % as given)",
-            percent(tuned),
-            percent(given)
+            "unexplained {} % as given, {} % tuned, {with} % with {it}",
+            percent(given),
+            percent(tuned)
         ),
-        None => format!("{} % unexplained as given, {with} % tuned and with {it}", percent(given)),
+        None => format!("unexplained {} % as given, {with} % tuned and with {it}", percent(given)),
     };
-    Some(format!("Where {names} {verb}: {}, {shares}.", id.name()))
+    let next = most_left(after, id);
+    Some(format!("Where {names} {verb}: {}, {shares}{next}.", id.name()))
+}
+
+/// Clause on the force or moment with the largest unexplained share in `after`. It is empty if that is the channel `named`, or if
+/// the share is below [`STATED`].
+fn most_left(after: &ModelResult, named: ChannelId) -> String {
+    let loads = ChannelId::ALL.into_iter().take(LOADS);
+    let left = loads.filter_map(|id| Some((id, share(after, id)?)));
+    match left.max_by(|a, b| a.1.total_cmp(&b.1)) {
+        Some((id, left)) if id != named && left > STATED => {
+            format!("; most left now: {}, {} %", id.name(), number(100.0 * left))
+        }
+        _ => String::new(),
+    }
 }
 
 /// Channels in which the catalogue says that the effects act; empty for effects that act on the deflections.
@@ -81,6 +97,21 @@ fn acted_on(effects: &[&str]) -> Vec<ChannelId> {
         Channel::Yaw => ChannelId::Yaw,
     };
     entries.flat_map(|entry| entry.channels.iter().map(of)).collect()
+}
+
+/// The amplitude ratio of error and variation that belongs to a share of the variance, with two significant figures.
+fn ratio(share: f64) -> String {
+    let ratio = share.max(LEAST).sqrt();
+    let places = (1 - ratio.log10().floor() as i32).clamp(0, 2) as usize;
+    format!("{ratio:.places$}")
+}
+
+fn kind(channel: ChannelId) -> &'static str {
+    match channel {
+        ChannelId::Roll | ChannelId::Pitch | ChannelId::Yaw => "moment",
+        ChannelId::Drag | ChannelId::Lift | ChannelId::Side => "force",
+        _ => "rate",
+    }
 }
 
 /// Sentence on the channel in which the first model leaves the largest share unexplained. It includes the shares that the other
@@ -99,12 +130,13 @@ pub(crate) fn of_models(models: &[ModelResult]) -> String {
         [] if left > MULTIPLE => {
             let lively = shares.find(|(_, share)| *share <= MULTIPLE);
             let lively = lively.map_or(String::new(), |(id, share)| {
-                format!("; of the livelier channels {}, {} %", id.name(), number(100.0 * share))
+                format!(" Of the livelier channels: {}, {} times.", id.name(), ratio(share))
             });
             format!(
-                "Where it fails: most in {name}, {} times its variation, which is tiny in these flights (a quiet \
-                 axis){lively}.",
-                number(left.sqrt())
+                "Where it fails: most in {name}: its error is {} times what the {} varies by, which is tiny in \
+                 these flights (a quiet axis).{lively}",
+                ratio(left),
+                kind(channel)
             )
         }
         [] => {
@@ -160,14 +192,15 @@ mod tests {
         let after = model("after", &[(Lift, 0.02), (Roll, 0.0009), (Alpha, 0.0)]);
         assert_eq!(
             of_added(&["propwash"], &given, Some(&tuned), &after).unwrap(),
-            "Where propwash acts: rolling moment, 38.0 % unexplained when tuned, 0.0900 % with it (293 % as given)."
+            "Where propwash acts: rolling moment, unexplained 293 % as given, 38.0 % tuned, 0.0900 % with it; most left \
+             now: lift, 2.00 %."
         );
         // without the tuned model the catalogue says where the effect acts
         let given = model("given", &[(Lift, 0.5), (Roll, 2.93)]);
         let after = model("after", &[(Lift, 0.1), (Roll, 0.0009)]);
         assert_eq!(
             of_added(&["lift_stall"], &given, None, &after).unwrap(),
-            "Where lift_stall acts: lift, 50.0 % unexplained as given, 10.0 % tuned and with it."
+            "Where lift_stall acts: lift, unexplained 50.0 % as given, 10.0 % tuned and with it."
         );
         assert_eq!(of_added(&[], &given, None, &after), None);
         assert_eq!(of_added(&["lift_stall"], &given, Some(&given), &given), None);
@@ -178,8 +211,8 @@ mod tests {
         let quiet = model("m", &[(Lift, 0.1), (Pitch, 723.61), (Yaw, 2.02), (Alpha, 5.0)]);
         assert_eq!(
             of_models(&[quiet]),
-            "Where it fails: most in pitching moment, 26.9 times its variation, which is tiny in these flights (a quiet \
-             axis); of the livelier channels yawing moment, 202 %."
+            "Where it fails: most in pitching moment: its error is 27 times what the moment varies by, which is tiny in \
+             these flights (a quiet axis). Of the livelier channels: yawing moment, 1.4 times."
         );
         // the rates are named only in the place of forces
         let rates = model("m", &[(Lift, 0.1), (Alpha, 5.0)]);

@@ -87,28 +87,43 @@ pub(crate) fn kept(samples: &[Sample], envelope: &EnvelopeFlown) -> Kept {
 
 /// Part of a sentence that states the time outside the envelope, the load factors and the largest angle of attack.
 pub(super) fn clause(kept: &Kept, limits: &Limits) -> String {
+    if !kept.judged {
+        return "the envelope was not judged: no sample counts as flight".into();
+    }
+    format!("{}: {}", outside(kept), loads(kept, limits))
+}
+
+/// Phrase with the load factors and the largest angle of attack, each with its limit.
+pub(super) fn loads(kept: &Kept, limits: &Limits) -> String {
     let of = |value: f64, limit: f64, unit: &str| {
         let stated =
             if limit.is_finite() { format!(" of {}{unit}", number(limit)) } else { String::new() };
         format!("{}{unit}{stated}", number(value))
     };
-    if !kept.judged {
-        return "the envelope was not judged: no sample counts as flight".into();
-    }
-    let seconds = kept.outside_s.any;
-    let outside = match seconds {
-        0.0 => "inside the envelope".to_owned(),
-        _ => {
-            let passed = kept.outside_s.passed();
-            let names: Vec<String> =
-                passed.iter().map(|(name, s)| format!("{name} {} s", number(*s))).collect();
-            format!("outside the envelope for {} s ({})", number(seconds), names.join(", "))
-        }
-    };
     let [least, most] = kept.load_factor;
     let load = format!("load factor {} to {}", number(least), of(most, limits.load_factor[1], ""));
     let alpha = format!("angle of attack up to {}", of(kept.alpha_deg, limits.stall_deg, "°"));
-    format!("{outside}: {load}, {alpha}")
+    format!("{load}, {alpha}")
+}
+
+/// Whether the aircraft left the envelope. Short excesses of load factor and angle of attack that `Kept::kept` allows do not
+/// count, nor does the rate of the commands.
+pub(super) fn left(kept: &Kept) -> bool {
+    let o = &kept.outside_s;
+    let attitude_or_speed = [o.bank, o.pitch, o.sideslip, o.slow, o.fast];
+    kept.judged && (!kept.kept || attitude_or_speed.iter().any(|seconds| *seconds > 0.0))
+}
+
+/// Phrase with the time outside the envelope, in total and for each limit.
+pub(super) fn outside(kept: &Kept) -> String {
+    let seconds = kept.outside_s.any;
+    if seconds <= 0.0 {
+        return "inside the envelope".to_owned();
+    }
+    let passed = kept.outside_s.passed();
+    let names: Vec<String> =
+        passed.iter().map(|(name, s)| format!("{name} {} s", number(*s))).collect();
+    format!("outside the envelope for {} s ({})", number(seconds), names.join(", "))
 }
 
 /// The largest value of the measure `of` over the segments; NaN if there is none.

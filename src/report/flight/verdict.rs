@@ -1,7 +1,7 @@
 //! The verdict on a flight: one sentence and the measurements that it is based on. A segment is the part of the flight with one
 //! target.
 
-use crate::flight::quality::{clause, kept, most};
+use crate::flight::quality::{clause, kept, left, loads, most, outside};
 use crate::flight::{Difficulty, FlightReport, Segment};
 use crate::kit::numbers::number;
 use crate::{LoopTiming, Outcome, Verdict};
@@ -29,13 +29,21 @@ struct Parts {
 impl Parts {
     fn of(report: &FlightReport) -> Parts {
         let (tracked, all) = (report.tracked(), report.segments.len());
-        let mut first = vec![match all {
+        let flown = report.envelope.map(|e| (kept(&report.flight.samples, &e), e.limits));
+        let left_it = flown.as_ref().filter(|(kept, _)| left(kept));
+        let mut first: Vec<String> =
+            left_it.map(|(kept, _)| capital(&outside(kept))).into_iter().collect();
+        first.push(match all {
+            0 if left_it.is_some() => {
+                format!("flew {:.1} s without a target", duration_s(&report.flight.samples))
+            }
             0 => format!("Flew {:.1} s without a target", duration_s(&report.flight.samples)),
-            _ if tracked == all && !left(report) => {
+            _ if tracked == all && left_it.is_none() => {
                 format!("Flew as commanded: {tracked} of {all} targets")
             }
+            _ if left_it.is_some() => format!("tracked {tracked} of {all} targets"),
             _ => format!("Tracked {tracked} of {all} targets"),
-        }];
+        });
         first.extend(slowest(report));
         first.extend(largest_error(&report.segments));
         let late = match report.timed().map(LoopTiming::late) {
@@ -45,8 +53,10 @@ impl Parts {
             Some(n) => format!("{n} late cycles of the companion"),
         };
         let settled = settled_by_difficulty(&report.segments);
-        let envelope =
-            report.envelope.map(|e| clause(&kept(&report.flight.samples, &e), &e.limits));
+        let envelope = flown.as_ref().map(|(kept, limits)| match left(kept) {
+            true => loads(kept, limits),
+            false => clause(kept, limits),
+        });
         let timed = report.timed().filter(|_| report.envelope.is_some());
         let latency = timed.map(|timing| {
             let [p50, p999] = timing.percentiles_us([0.5, 0.999]).map(|us| us / 1e3);
@@ -74,14 +84,13 @@ pub(crate) fn verdict(report: &FlightReport) -> Verdict {
     let late = report.timed().map(LoopTiming::late);
     let judged = report.envelope.map(|e| kept(&report.flight.samples, &e)).filter(|k| k.judged);
     let kept = judged.map(|k| k.kept);
-    let reason = reason(all - tracked, late, kept);
-    let outcome = match (all, late) {
-        _ if tracked < all => Outcome::Missed,
-        _ if kept == Some(false) => Outcome::Missed,
-        (_, Some(1..)) => Outcome::Missed,
-        (0, _) | (_, None) => Outcome::Open,
-        _ if report.envelope.is_some() && kept.is_none() => Outcome::Open,
-        _ => Outcome::Reached,
+    let cycles = report.timed().map_or(0, |timing| timing.cycles.len());
+    let outcome = outcome(report, kept, late);
+    let reason = match (outcome, late) {
+        (Outcome::Late, Some(late)) => {
+            format!("this computer was late in {late} of {cycles} cycles")
+        }
+        _ => reason(all - tracked, late, kept),
     };
     let Parts { first, beside } = Parts::of(report);
     let beside = beside.iter().map(|part| capital(part) + ".");
@@ -89,6 +98,19 @@ pub(crate) fn verdict(report: &FlightReport) -> Verdict {
     let sentence = format!("{}.", first.join("; "));
     let (before_next, next) = (String::new(), report.next.clone());
     Verdict { outcome, reason, sentence, details, before_next, next }
+}
+
+/// The outcome of a flight. `kept` states whether the aircraft kept to the envelope, and `late` the number of late cycles; `None`
+/// if they are unknown.
+fn outcome(report: &FlightReport, kept: Option<bool>, late: Option<usize>) -> Outcome {
+    let (tracked, all) = (report.tracked(), report.segments.len());
+    match (all, late) {
+        _ if tracked < all || kept == Some(false) => Outcome::Missed,
+        (0, _) | (_, None) => Outcome::Open,
+        _ if report.envelope.is_some() && kept.is_none() => Outcome::Open,
+        (_, Some(1..)) => Outcome::Late,
+        _ => Outcome::Reached,
+    }
 }
 
 /// The missed requirements as text; empty if none was missed.
@@ -130,14 +152,6 @@ fn on_the_way(report: &FlightReport) -> Option<String> {
     let overshoot = most(&qualities, |q| q.overshoot_deg[0].max(q.overshoot_deg[1]));
     let (integral, overshoot) = (number(integral), number(overshoot));
     Some(format!("integral of error up to {integral}° s{at}, overshoot up to {overshoot}°"))
-}
-
-/// Whether the flight left the envelope.
-fn left(report: &FlightReport) -> bool {
-    report.envelope.is_some_and(|e| {
-        let flown = kept(&report.flight.samples, &e);
-        flown.judged && !flown.kept
-    })
 }
 
 /// Text on the target that took longest to reach; `None` without segments or limits, or with a single segment.

@@ -52,6 +52,8 @@ pub enum Outcome {
     Reached,
     /// A requirement was missed.
     Missed,
+    /// The aircraft met all requirements, but the computer was late in some cycles.
+    Late,
     /// There is no requirement, or the result is undetermined.
     Open,
     /// A check found nothing to correct.
@@ -82,6 +84,7 @@ impl Verdict {
         let (class, word) = match self.outcome {
             Outcome::Reached => ("reached", "Reached"),
             Outcome::Missed => ("missed", "Missed"),
+            Outcome::Late => ("late", "Reached"),
             Outcome::Open => ("open", "Open"),
             Outcome::Sound => ("reached", "Sound"),
             Outcome::Faulty => ("missed", "To correct"),
@@ -89,9 +92,10 @@ impl Verdict {
         let details: String =
             self.details.iter().map(|d| format!("<li>{}</li>", escape(d))).collect();
         let list = if details.is_empty() { details } else { format!("<ul>{details}</ul>") };
+        let joint = if self.outcome == Outcome::Late { ", but " } else { ": " };
         let reason = match self.reason.is_empty() {
             true => String::new(),
-            false => format!(": {}", escape(&self.reason)),
+            false => format!("{joint}{}", escape(&self.reason)),
         };
         format!(
             "<div class=\"verdict {class}\"><span class=\"outcome\">{word}{reason}</span><p>{}</p>{}{list}</div>\n",

@@ -62,8 +62,9 @@ pub fn sentence(subject: &Subject) -> String {
         };
         if subject.unexplained > QUIET {
             return format!(
-                "{noun} hardly varies in these flights (a quiet axis): the residual is more than ten times \
-                 the channel's variation, {why}"
+                "{noun} hardly varies in these flights (a quiet axis): the residual is {} times the \
+                 channel's variation, {why}",
+                significant(subject.unexplained.sqrt(), 2)
             );
         }
         return format!("{noun}: {share} of its variation is unexplained, {why}");
@@ -151,7 +152,10 @@ fn strength(channel: ChannelId, regime: &Regime) -> String {
 /// The regime in words (" for α > 9°"), with the trend of the residual over the regime's variable.
 fn place(subject: &Subject, Finding { regime, trend }: &Finding) -> String {
     let Some(variable) = regime.variable else {
-        let along = subject.follows.map(|v| format!(", and the error follows {}", spoken(v)));
+        let along = subject.follows.map(|v| match v {
+            RegimeVariable::Flight => ", and differs from flight to flight".into(),
+            v => format!(", and the error follows {}", spoken(v)),
+        });
         return format!(" throughout{}", along.unwrap_or_default());
     };
     let whole = regime.low.is_nan() && regime.high.is_nan();
@@ -307,6 +311,7 @@ mod tests {
         };
         let quiet = of(4232.66);
         assert!(quiet.contains("rolling moment hardly varies") && !quiet.contains('%'), "{quiet}");
+        assert!(quiet.contains("the residual is 65 times the channel's variation"), "{quiet}");
         assert!(of(f64::NAN).ends_with(": it is unknown, so nothing can be said"));
         assert!(of(7.18).contains("718 % of its variation is unexplained"), "{}", of(7.18));
     }

@@ -25,6 +25,9 @@ export function failing(of) {
     parts = build();
     body.replaceChildren(parts.base, parts.grid, parts.finding, parts.where, parts.tools, parts.states, parts.command);
   }
+  // a new diagnosis selects the cell of its first effect, whatever was selected before
+  const key = bench.diagnosis && state.diagnosis.key;
+  if (key && key !== pick.diagnosed) Object.assign(pick, { diagnosed: key, base: "tuned", by_hand: false });
   switcher();
   grid();
   parts.command.replaceChildren(...[command(state.commands.compare)].filter(Boolean));
@@ -122,8 +125,18 @@ function grid() {
   const one = (c, v) => el("td", {}, cells(c)[v] && cell(c, cells(c)[v], size(c)));
   const table = narrow.matches ? turned(shown, fits, used, one) : upright(shown, fits, one);
   const symbols = used.map((v) => `${SYMBOL[v]} ${name(shown, v)}`).join(", ");
-  parts.grid.replaceChildren(table, el("p", { class: "note" }, `R²: what the model explains, ${word()}${after ? `; after: ${with_effects()}` : ""}. Numbers: how much of what is left goes with each variable, %. ${narrow.matches ? "" : `${symbols}.`}`));
+  parts.grid.replaceChildren(table, el("p", { class: "note" }, `R²: what the model explains, ${word()}${after ? `; after: ${with_effects()}` : ""}. Numbers: how much of what is left goes with each variable, %. ${narrow.matches ? "" : `${symbols}.`}`), late() ?? "");
   finding();
+}
+/** Caption on the columns of deflection rates in flights whose recorded deflections are late; null if there is none. */
+function late() {
+  const shown = bench.failing.flights.map((place) => bench.state.flights[place]);
+  const noted = shown.filter((f) => f?.notes?.some((note) => note.startsWith("The recorded actuators seem")));
+  const times = noted.flatMap((f) => f.nuisances.filter((n) => n.name === "skew_actuators").map((n) => Math.round(1000 * n.value)));
+  if (!times.length) return null;
+  const [low, high] = [Math.min(...times), Math.max(...times)];
+  const range = low === high ? `${low}` : `${low} to ${high}`;
+  return el("p", { class: "note" }, `Recorded actuators ${range} ms late: the columns of aileron and elevator movement show their clock, or a lag that the record does not show.`);
 }
 /** The table with one row for each channel. */
 function upright(shown, fits, one) {
@@ -165,16 +178,17 @@ function pressed_cell() {
 /** Chooses the channel and the variable in which an effect acts, so that the plots show the accepted effect. */
 export function follow(effect) {
   const channels = bench?.failing && models()[0].channels;
-  const channel = effect && channels?.find((c) => c.channel === (effect.curve?.channel ?? effect.channels[0]));
+  const channel = effect && channels?.find((c) => c.channel === acts_in(effect));
   if (!channel) return;
   const named = channel.bins.find((b) => VARIABLES.includes(b.variable) && effect.curve?.variable.startsWith(b.name));
   Object.assign(pick, { channel: channel.channel, variable: named?.variable ?? pick.variable, by_hand: true });
 }
 /** Initial choice: the cell in which an asserted effect acts, else the cell that explains most of the residual. */
 function start(channels) {
-  const found = way(bench.failing.ways) === "tuned" ? bench.diagnosis?.effects.find((e) => e.asserted && e.curve) : null;
-  const channel = found && channels.find((c) => c.channel === found.curve.channel);
-  const named = channel?.bins.find((b) => VARIABLES.includes(b.variable) && found.curve.variable.startsWith(b.name));
+  const found = way(bench.failing.ways) === "tuned" ? bench.diagnosis?.effects.find((e) => e.asserted && acts_in(e)) : null;
+  const channel = found && channels.find((c) => c.channel === acts_in(found));
+  const usable = channel?.bins.filter((b) => VARIABLES.includes(b.variable)) ?? [];
+  const named = usable.find((b) => found.curve?.variable.startsWith(b.name)) ?? usable.sort((a, b) => b.explained - a.explained)[0];
   if (named) {
     Object.assign(pick, { channel: channel.channel, variable: named.variable });
     return;
@@ -186,6 +200,8 @@ function start(channels) {
       if (weight > best) [best, pick.channel, pick.variable] = [weight, c.channel, b.variable];
     }
 }
+/** Channel in which an effect acts most visibly; undefined if it acts in none. */
+const acts_in = (effect) => effect.curve?.channel ?? effect.channels[0];
 const chosen = (model) => model?.channels.find((c) => c.channel === pick.channel);
 const over = (channel) => channel?.bins.find((b) => b.variable === pick.variable);
 /** The bin with the largest mean residual of the model without effects. */
@@ -196,7 +212,10 @@ function worst() {
 }
 function finding() {
   const channel = chosen(models()[0]);
-  parts.finding.textContent = capital(channel?.worst_regime ?? "");
+  const found = bench.diagnosis?.effects.filter((e) => e.asserted && e.channels.includes(channel?.channel)).map((e) => e.id) ?? [];
+  const left = channel?.unexplained_fraction;
+  const small = found.length > 0 && left != null && left < 0.001;
+  parts.finding.textContent = small ? `${capital(channel.name)}: little is left (${show(Math.max(0, 100 * left), 2)} %), and an effect explains it: ${found.join(" or ")}` : capital(channel?.worst_regime ?? "");
 }
 
 // ---- over time ----

@@ -65,7 +65,10 @@ async function load_flight(own = fresh) {
   for (const place of all.keys()) if (open(all[place]) && own === fresh) await data(place);
   if (own !== fresh) return;
   light();
-  if (!bench.by_hand && bench.flight) choose_lit();
+  const key = bench.diagnosis && bench.state.diagnosis.key;
+  const fresh_diagnosis = !!key && key !== bench.diagnosed;
+  bench.diagnosed = key ?? bench.diagnosed;
+  if (!bench.by_hand && bench.flight) choose_lit(fresh_diagnosis);
 }
 /** Data of a flight over time; requested only once. */
 async function data(place) {
@@ -80,9 +83,9 @@ function light(by = lights) {
   flights(bench);
 }
 const seconds = (spans) => (spans ?? []).reduce((sum, [from, to]) => sum + to - from, 0);
-/** If the chosen flight has no highlighted time, chooses the flight with most of it. Returns whether it did. */
-function choose_lit() {
-  if (seconds(bench.lit.get(bench.chosen)) > 0) return false;
+/** If the chosen flight has no highlighted time, or `always`, chooses the flight with most of it. Returns whether it did. */
+function choose_lit(always = false) {
+  if (!always && seconds(bench.lit.get(bench.chosen)) > 0) return false;
   const [place] = [...bench.lit].sort((a, b) => seconds(b[1]) - seconds(a[1]))[0] ?? [];
   if (place == null || place === bench.chosen || !seconds(bench.lit.get(place))) return false;
   choose(place);

@@ -44,15 +44,20 @@ function first(job) {
     el("li", {}, `${c.id}: evidence ${show(c.evidence)}, chance reaches ${show(c.threshold)}`))));
 }
 function verdict(bench, diagnosis) {
-  const [lead, ...rest] = diagnosis.sentences;
-  const then = next(bench, diagnosis);
+  const found = diagnosis.effects.find((e) => e.asserted && !ticked(bench, e.id));
+  const said = found ? [missing(found), ...diagnosis.sentences] : diagnosis.sentences;
+  const [lead, ...rest] = said;
+  const then = found ? null : next(bench, diagnosis);
   return el("div", { class: `verdict ${diagnosis.verdict}` }, el("p", {}, lead ?? diagnosis.verdict), then && el("p", { class: "next" }, then), rest.length ? more("More", rest.map((s) => el("p", {}, s)), "sentences") : null);
 }
-/** Where the first asserted effect that is not accepted acts, and the next step; null if there is no such step. */
+/** The first asserted effect that is not accepted, where it acts, and the next step. */
+function missing(found) {
+  const where = found.channels.length ? `, in ${channel_words(found.channels)}` : "";
+  const other = found.indistinguishable_from.length ? ` (or ${found.indistinguishable_from.join(", ")})` : "";
+  return `Missing: ${found.id}${other}${where}. Next: tick it.`;
+}
+/** The next step after a diagnosis that leaves no effect to accept; null if there is none. */
 function next(bench, diagnosis) {
-  const found = diagnosis.effects.find((e) => e.asserted && !ticked(bench, e.id));
-  const where = found?.channels.length ? `Acts in ${channel_words(found.channels)}. ` : "";
-  if (found) return `${where}Next: tick ${found.id}.`;
   const fitted = bench.state.flights.filter((f) => f.role === "fit" && !f.error);
   const alone = diagnosis.verdict === "unknown" && fitted.length === 1;
   return alone ? "Next: drop more flights into the pane Flights, then Diagnose again." : null;
@@ -80,11 +85,11 @@ function suspect(bench, e, most) {
   return el("article", { class: `suspect ${e.asserted ? "asserted" : ""}` },
     el("label", {}, box, el("span", {}, e.id, " ", tag)),
     el("p", { class: "muted" }, e.description),
-    // the curve is the main evidence, so it comes before the text
+    // the numbers come before the curve, which a low window cuts off
+    el("p", {}, `Evidence ${show(e.evidence)}; chance reaches ${show(e.threshold)}. `, facts.filter(Boolean).join("; "), "."),
     e.curve && above ? el("figure", {}, el("figcaption", {}, el("b", {}, `${e.curve.channel} (${e.curve.unit}) over ${e.curve.variable}`), el("span", { class: "muted" }, "dots: what the tuned model leaves; line: the effect")), el("div", { class: "plot", "data-curve": e.id })) : "",
     el("div", { class: "meter", role: "img", "aria-label": `evidence ${show(e.evidence)}, chance reaches ${show(e.threshold)}`, title: `evidence ${show(e.evidence)}; chance reaches ${show(e.threshold)} (log scale)` },
       el("i", { vars: { width: `${log(e.evidence)}%` } }), el("b", { vars: { left: `${log(e.threshold)}%` } })),
-    el("p", {}, `Evidence ${show(e.evidence)}; chance reaches ${show(e.threshold)}. `, facts.filter(Boolean).join("; "), "."),
     ...e.refused.map((why) => el("p", { class: "bad" }, why)),
     e.indistinguishable_from.length ? el("p", {}, "These flights cannot tell it from ", el("b", {}, e.indistinguishable_from.join(", ")), ".") : "",
     e.indistinguishable_from.length ? el("div", { class: "row" }, e.indistinguishable_from.map((other) => apart(bench, [e.id, other]))) : "",

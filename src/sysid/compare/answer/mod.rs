@@ -195,7 +195,7 @@ mod tests {
         assert_eq!(
             answer.error,
             "On 2 flights not fitted the error at 5 s falls from 0.0873 to 0.0234 by tuning (−73 %) and to 0.00083 with \
-             drag_beta2 (another −96 %)."
+             drag_beta2 (a further −96 %; −99.0 % in all)."
         );
         // the effect reduces the scaled error of airspeed most, from 0.05 to 0.002; the scaled error of sideslip, 0.0067,
         // is then the largest
@@ -204,10 +204,7 @@ mod tests {
             "drag_beta2 (drag rises with the square of sideslip): CDbeta2 = 0.991 (95 %: 0.986 to 0.997). With it the \
              airspeed predicted 5 s ahead is off by 0.02 m/s instead of 0.5 m/s by tuning alone."
         );
-        assert_eq!(
-            answer.left,
-            "Largest error against its usual range: sideslip, 0.115° after 5 s."
-        );
+        assert_eq!(answer.left, "Largest error left: sideslip, 0.115° after 5 s.");
         assert_eq!(answer.summary(), "error at 5 s 0.0873 → 0.00083 (−99.0 %)");
         let json = serde_json::to_value(&answer).unwrap();
         assert_eq!(json["numbers"]["steps"][2]["error"], 0.00083);
@@ -229,7 +226,7 @@ mod tests {
         let one = Answer::of(&subject(&scores[..1], Vec::new()));
         assert_eq!(one.error, "On 2 flights not fitted the error at 5 s is 0.02.");
         assert!(one.effect.is_empty() && one.summary() == "error at 5 s 0.02");
-        assert_eq!(one.left, "Largest error against its usual range: airspeed, 0.5 m/s after 5 s.");
+        assert_eq!(one.left, "Of the predicted states, airspeed is worst: 0.5 m/s after 5 s.");
     }
 
     #[test]
@@ -241,10 +238,7 @@ mod tests {
             "Keep the model as it is: on 2 flights not fitted its error at 5 s is 0.02; tuned it is 0.04."
         );
         // the largest error is that of the model as given, and no gain of the tuned model is praised
-        assert_eq!(
-            tuned.left,
-            "Largest error of the model as given, against its usual range: airspeed, 0.5 m/s after 5 s."
-        );
+        assert_eq!(tuned.left, "Largest error of the model as given: airspeed, 0.5 m/s after 5 s.");
         assert_eq!(tuned.effect, "");
         let fitted = Answer::of(&Subject { seen: Seen::Of(2), ..subject(&scores, Vec::new()) });
         assert_eq!(

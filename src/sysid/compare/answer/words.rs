@@ -44,7 +44,10 @@ pub fn error(n: &Numbers) -> String {
             _ => format!(" and {} {}{}", verb.toward(), number(step.error), by(n, step)),
         };
         let change = match step.change_percent {
-            Some(p) if again && step.way != Way::Other => format!(" (another {})", percent(p)),
+            Some(p) if again && step.way != Way::Other => {
+                let all = if k + 1 == rest.len() { in_all(n) } else { String::new() };
+                format!(" (a further {}{all})", percent(p))
+            }
             Some(p) => format!(" ({})", percent(p)),
             None => String::new(),
         };
@@ -52,6 +55,11 @@ pub fn error(n: &Numbers) -> String {
         last = Some(verb);
     }
     text + "."
+}
+
+/// The change from the first to the last model, as the end of a bracket.
+fn in_all(n: &Numbers) -> String {
+    format!("; {} in all", percent(n.change_percent))
 }
 
 /// Sentence on a model whose error rises from `given` to `tuned` by tuning.
@@ -144,17 +152,18 @@ fn in_use(n: &Numbers, used: &InUse, subject: &str) -> String {
     )
 }
 
-/// Sentence on the state with the largest remaining error relative to its scale; empty if there is no error.
+/// Sentence on the state with the largest remaining error relative to its scale. It is empty if there is no error, or if the
+/// sentence of [`effect`] already states the error of this state.
 pub fn left(n: &Numbers) -> String {
-    n.left.as_ref().map_or(String::new(), |Left { state, rmse }| {
-        let (name, unit, factor) = people(state);
-        let of = if n.in_vain() { " of the model as given," } else { "" };
-        format!(
-            "Largest error{of} against its usual range: {name}, {}{unit} after {} s.",
-            number(factor * rmse),
-            number(n.horizon_s)
-        )
-    })
+    let Some(Left { state, rmse }) = &n.left else { return String::new() };
+    let (name, unit, factor) = people(state);
+    let error = format!("{}{unit} after {} s", number(factor * rmse), number(n.horizon_s));
+    match n.steps.len() {
+        0 | 1 => format!("Of the predicted states, {name} is worst: {error}."),
+        _ if n.in_vain() => format!("Largest error of the model as given: {name}, {error}."),
+        _ if n.in_use.as_ref().is_some_and(|used| used.state == *state) => String::new(),
+        _ => format!("Largest error left: {name}, {error}."),
+    }
 }
 
 /// The change of the error as a short phrase.
