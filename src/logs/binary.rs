@@ -51,9 +51,8 @@ pub(super) fn read(
     findings.extend(topics.findings);
     if !no_wings {
         findings.extend(assess::channels(&table.channels, &table.rows, &flies));
-        let found = on_wings(&table.rows, &hovers, &flies);
+        let found = on_wings(&mut table.rows, &hovers, &flies);
         findings.extend(found.into_iter().map(|f| named(f, &table.rules, o)));
-        screening::leave_out_dead(&mut table.rows, &flies);
     }
     let kept = kept(&mut table, path, o, to, &mut findings)?;
     findings.extend(dropped(kept.dropped, &kept.dropped_rows));
@@ -101,11 +100,16 @@ fn of_all(mut whole: table::Whole, hovers: &[(f64, f64)], flies: &Flying) -> Str
     Stretches { phases, ..whole.stretches }
 }
 
-/// Findings on `rows`, which contain wing-borne flight only. `hovers` are the intervals (start and end, s) of hover.
-fn on_wings(rows: &[Sample], hovers: &[(f64, f64)], flies: &Flying) -> Vec<Finding> {
+/// Findings on `rows`, which contain wing-borne flight only. Sensors that are constant in all of them are set to NaN. `hovers` are
+/// the intervals (start and end, s) of hover.
+fn on_wings(rows: &mut [Sample], hovers: &[(f64, f64)], flies: &Flying) -> Vec<Finding> {
     match rows.is_empty() && !hovers.is_empty() {
         true => vec![Finding::problem(NEVER_ON_WINGS)],
-        false => screening::screen(rows, flies),
+        false => {
+            let found = screening::screen(rows, flies);
+            screening::leave_out_dead(rows, flies);
+            found
+        }
     }
 }
 
