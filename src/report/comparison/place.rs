@@ -30,27 +30,26 @@ pub(crate) fn of_comparison(c: &Comparison) -> String {
     added.unwrap_or_else(|| of_models(&c.models))
 }
 
-/// Sentence on the channel in which the `effects` that were added to `after` reduce the unexplained share most, in
-/// proportion. The share is compared with that of the tuned model. If `tuned` is unknown, it is compared with that of the
-/// given model, in the channels in which the effects act. `None` if there is no effect or no reduction.
+/// Sentence on the channel in which the `effects` that were added to `after` reduce the unexplained share most, among the
+/// channels in which they act. For effects that act on deflections, all forces and moments are compared. The share is compared
+/// with that of the tuned model, or with that of the given model if `tuned` is unknown. `None` if there is no effect or no
+/// reduction.
 pub(crate) fn of_added(
     effects: &[&str],
     given: &ModelResult,
     tuned: Option<&ModelResult>,
     after: &ModelResult,
 ) -> Option<String> {
-    let ratio = |id: &ChannelId| {
-        let before = share(tuned.unwrap_or(given), *id)?;
-        let ratio = before / share(after, *id)?.max(LEAST);
-        (ratio > 1.0).then_some((*id, ratio))
+    let fall = |id: &ChannelId| {
+        let fall = share(tuned.unwrap_or(given), *id)? - share(after, *id)?;
+        (fall > 0.0).then_some((*id, fall))
     };
     let best = |ids: &[ChannelId]| {
-        ids.iter().filter_map(ratio).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(id, _)| id)
+        ids.iter().filter_map(fall).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(id, _)| id)
     };
     let all = ChannelId::ALL;
     let (loads, rates) = all.split_at(LOADS);
-    let own = if tuned.is_some() { loads.to_vec() } else { acted_on(effects) };
-    let id = best(&own).or_else(|| best(loads)).or_else(|| best(rates))?;
+    let id = best(&acted_on(effects)).or_else(|| best(loads)).or_else(|| best(rates))?;
     let percent = |model: &ModelResult| {
         share(model, id).map_or("–".into(), |share| number(100.0 * share.max(0.0)))
     };

@@ -79,7 +79,7 @@ function suspect(bench, e, most) {
   const tag = e.asserted ? el("span", { class: "tag" }, "asserted") : above && e.refused.length ? el("span", { class: "tag bad" }, "refused") : null;
   const log = (v) => 100 * Math.log10(1 + Math.max(0, v)) / Math.log10(1 + most);
   const facts = [decisive(e)];
-  if (e.heldout_error_reduction != null) facts.push(`takes ${percent(e.heldout_error_reduction)} of the error on held-out segments`);
+  if (e.heldout_error_reduction != null) facts.push(`explains ${percent(e.heldout_error_reduction)} of what tuning leaves there (squares, on segments not fitted)`);
   if (e.selected_in_bootstraps != null) facts.push(`best in ${percent(e.selected_in_bootstraps)} of bootstraps`);
   if (e.channels.length) facts.push(`acts in ${channel_words(e.channels)}`);
   return el("article", { class: `suspect ${e.asserted ? "asserted" : ""}` },

@@ -27,7 +27,7 @@ pub struct Order {
     pub schedule: String,
     /// Name of the controller. It is designed from the session's model.
     pub controller: String,
-    /// Name of the simulated aircraft, one of [`AIRCRAFT`].
+    /// Name of the simulated aircraft, one of those that the page offers.
     pub aircraft: String,
     /// Effects that are added to the simulated aircraft and that the model lacks. Each is written as ID=AMPLITUDE; spaces
     /// separate them.
