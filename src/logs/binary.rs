@@ -105,11 +105,7 @@ fn of_all(mut whole: table::Whole, hovers: &[(f64, f64)], flies: &Flying) -> Str
 fn on_wings(rows: &mut [Sample], hovers: &[(f64, f64)], flies: &Flying) -> Vec<Finding> {
     match rows.is_empty() && !hovers.is_empty() {
         true => vec![Finding::problem(NEVER_ON_WINGS)],
-        false => {
-            let found = screening::screen(rows, flies);
-            screening::leave_out_dead(rows, flies);
-            found
-        }
+        false => screening::screened(rows, flies),
     }
 }
 

@@ -74,8 +74,7 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
     made.extend(derive::apply(&mut raw.rows, &options.mapping));
     findings.extend(assess::channels(&channels, &raw.rows, &flies));
     if !timeless {
-        findings.extend(screening::screen(&raw.rows, &flies));
-        screening::leave_out_dead(&mut raw.rows, &flies);
+        findings.extend(screening::screened(&mut raw.rows, &flies));
     }
     findings.extend(made.iter().map(Finding::note));
     let reading = match lacking {

@@ -28,7 +28,7 @@ use super::phases::{self, Flying, PhaseKind};
 const ENOUGH: usize = 50;
 
 /// Returns all findings about `rows`. `flies` states when the aircraft counts as flying.
-pub fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
+fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
     if rows.is_empty() {
         return vec![Finding::problem("the log has no rows with all needed channels")];
     }
@@ -53,11 +53,14 @@ pub fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
     out
 }
 
-/// Sets optional columns to NaN that are constant although the aircraft flies. [`screen`] reports them.
-pub fn leave_out_dead(rows: &mut [Sample], flies: &Flying) {
+/// Returns all findings about `rows`, as [`screen`]. Then sets those sensor columns to NaN that are constant although the aircraft
+/// flies.
+pub fn screened(rows: &mut [Sample], flies: &Flying) -> Vec<Finding> {
+    let found = screen(rows, flies);
     if rows.len() >= ENOUGH && !in_flight(rows, flies).is_empty() {
         dead::blank(rows);
     }
+    found
 }
 
 /// Checks of units, signs and axes. They use the rows in wing-borne flight (`flown`) if there are enough, because
