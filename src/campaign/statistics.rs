@@ -3,7 +3,7 @@
 //! The method follows the package rliable (Agarwal et al. 2021). The interquartile mean omits the smallest and the largest
 //! quarter of all scores. Intervals are percentiles of a bootstrap that draws runs with replacement within each stratum. A
 //! stratum is a task: the runs that differ only in their seed. One definition differs from rliable: the median is taken
-//! over all runs, not over the means of the tasks. The paper \[GSFM26\] (see `src/lib.rs`) does not say which of the two
+//! over all runs, not over the means of the tasks. The paper \[GSFM26\] (see `src/lib.rs`) does not state which of the two
 //! medians its tables contain.
 
 use greylag_num::bootstrap;

@@ -2,7 +2,7 @@
 //!
 //! A campaign runs the commands of its stages with all combinations of seeds and levels. A level is one setting of an axis,
 //! such as one controller of the axis "controller". Each run is a cell and has a record with its measured quantities. A
-//! claim says that a quantity is smaller in the cells `less` than in the cells `than`.
+//! claim states that a quantity is smaller in the cells `less` than in the cells `than`.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -61,7 +61,7 @@ pub fn policy(
     Ok(Some(agent))
 }
 
-/// A note for the user if the policy in `folder` was not trained in `model`. `origin` says in which model it was trained.
+/// A note for the user if the policy in `folder` was not trained in `model`. `origin` states in which model it was trained.
 fn foreign_policy_note(origin: &Origin, model: &GreyBox, folder: &Path) -> Option<String> {
     (origin.model_sha256 != model.sha256).then(|| {
         format!(

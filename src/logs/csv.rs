@@ -50,7 +50,7 @@ pub enum CsvError {
         path: PathBuf,
         /// Name of the missing column.
         column: &'static str,
-        /// Text that tells the user how to supply the column.
+        /// Text that shows the user how to supply the column.
         remedy: String,
     },
     /// More than 5 % of the rows are unusable.

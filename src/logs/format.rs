@@ -1,4 +1,4 @@
-//! The five log formats. A file's first bytes tell which format it has.
+//! The five log formats. A file's first bytes show which format it has.
 
 use serde::Serialize;
 

@@ -1,6 +1,6 @@
 //! Reads a log file of any format into one table.
 //!
-//! A finding is a defect or peculiarity of the log that its user is told. A mapping states which field of the file fills which
+//! A finding is a defect or peculiarity of the log that is reported to the user. A mapping states which field of the file fills which
 //! column.
 
 use std::io::{BufReader, Read};

@@ -1,6 +1,6 @@
 //! Resamples the fields of a log, which have different sample rates, onto one table.
 //!
-//! A topic is one type of message in a log. A rule tells which topic and which of its fields fill which columns. The samples that
+//! A topic is one type of message in a log. A rule states which topic and which of its fields fill which columns. The samples that
 //! a rule selects form a channel.
 //!
 //! The table's times are those of attitude or body rates, whichever has more samples. Continuous channels are interpolated

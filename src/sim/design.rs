@@ -1,6 +1,6 @@
 //! Experiment design: finds the manoeuvre that best discriminates two effects. An effect is a group of terms that a model may
 //! lack, such as stall. Each manoeuvre of a menu is simulated with the model plus one effect and with the model plus the
-//! other. [`Separation::apart`] measures how well the two effects are then told apart.
+//! other. [`Separation::apart`] measures how well the two effects are then distinguished.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 

@@ -117,7 +117,7 @@ fn outcome(work: impl FnOnce() -> Result<(), WorkbenchError>) -> Result<(), Work
 }
 
 impl Bench {
-    /// Tells the pages that results have changed.
+    /// Notifies the pages that results have changed.
     pub(super) fn changed(&self) {
         (self.on_event)(Event::Changed { revision: self.revision() });
     }

@@ -20,7 +20,7 @@ pub enum Pace {
 pub const PATIENCE: Duration = Duration::from_millis(1200);
 
 /// Largest time that the interval between two polls of the link adds to the silence of the vehicle. In a longer interval the
-/// companion has stalled and could not hear the vehicle.
+/// companion has stalled and could not receive from the vehicle.
 const LISTENED: Duration = Duration::from_millis(100);
 
 /// Maps host time to vehicle time.

@@ -44,7 +44,7 @@ const AUTOPILOT: Source = Source { system: 1, component: 1 };
 const CATCH_UP: Duration = Duration::from_millis(50);
 /// Longest wait for the network thread to deliver queued packets after a stall.
 const HAND_OVER: Duration = Duration::from_secs(2);
-/// Interval between two readings of the operating system's scheduler counters, which tell the cause of a stall.
+/// Interval between two readings of the operating system's scheduler counters, which show the cause of a stall.
 const WAITED: Duration = Duration::from_secs(1);
 
 /// A received packet with its origin.

@@ -59,7 +59,7 @@ pub fn heartbeat() -> Message {
     }))
 }
 
-/// SET_ATTITUDE_TARGET with roll and pitch (rad) and zero yaw. The mask tells the receiver to ignore body rates and thrust.
+/// SET_ATTITUDE_TARGET with roll and pitch (rad) and zero yaw. The mask makes the receiver ignore body rates and thrust.
 pub fn attitude_target(to: Source, time_ms: u32, roll: f64, pitch: f64) -> Message {
     Message::coded(MavMessage::SET_ATTITUDE_TARGET(SET_ATTITUDE_TARGET_DATA {
         time_boot_ms: time_ms,

@@ -156,7 +156,7 @@ fn attitude_quaternion(status: &Status, scene: &Scene) -> Option<MavMessage> {
     }))
 }
 
-/// Builds ATTITUDE_TARGET. The type mask tells the receiver to ignore the body rates, and without a commanded attitude also the
+/// Builds ATTITUDE_TARGET. The type mask makes the receiver ignore the body rates, and without a commanded attitude also the
 /// attitude.
 fn attitude_target(status: &Status, scene: &Scene) -> MavMessage {
     let yaw = if status.attitude[2].is_finite() { status.attitude[2] } else { 0.0 };
@@ -173,7 +173,7 @@ fn attitude_target(status: &Status, scene: &Scene) -> MavMessage {
     })
 }
 
-/// Bits of ATTITUDE_TARGET_TYPEMASK. The first tell the receiver to ignore the body rates, the second to ignore the attitude.
+/// Bits of ATTITUDE_TARGET_TYPEMASK. With the first the receiver ignores the body rates, with the second the attitude.
 const RATES_IGNORED: u8 = 0b111;
 const ATTITUDE_IGNORED: u8 = 1 << 7;
 

@@ -1,4 +1,4 @@
-//! The header of a CSV table. It tells which field of a row (a value of the file) fills which column of Greylag's log format.
+//! The header of a CSV table. It states which field of a row (a value of the file) fills which column of Greylag's log format.
 //! This file also parses the fields' numbers.
 
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! The mapping file as it is deserialised from TOML, and the checks of its parts. A mapping file tells which fields of a log
+//! The mapping file as it is deserialised from TOML, and the checks of its parts. A mapping file states which fields of a log
 //! fill the columns of Greylag's log format.
 
 use std::collections::BTreeMap;

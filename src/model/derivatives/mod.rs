@@ -50,7 +50,7 @@ pub enum DerivativesError {
     Missing {
         /// Name of the number.
         name: String,
-        /// Text that says which output of the tool contains the number.
+        /// Text that states which output of the tool contains the number.
         tool: &'static str,
     },
     /// A value is not a number.

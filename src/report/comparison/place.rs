@@ -84,7 +84,7 @@ fn most_left(after: &ModelResult, named: ChannelId) -> String {
     }
 }
 
-/// Channels in which the catalogue says that the effects act; empty for effects that act on the deflections.
+/// Channels in which the effects act according to the catalogue; empty for effects that act on the deflections.
 fn acted_on(effects: &[&str]) -> Vec<ChannelId> {
     let entries = effects.iter().filter_map(|id| describe(id)?.entry);
     let of = |channel: &Channel| match channel {

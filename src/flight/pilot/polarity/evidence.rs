@@ -1,4 +1,4 @@
-//! Data of the polarity check, which finds out whether aileron and elevator act in the direction that the model says. The
+//! Data of the polarity check, which finds out whether aileron and elevator act in the direction that the model predicts. The
 //! measured roll and pitch rates are regressed on the modelled responses to the recorded commands.
 
 use std::ops::RangeInclusive;

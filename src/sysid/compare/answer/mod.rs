@@ -101,7 +101,7 @@ impl Answer {
         Answer { next, ..self }
     }
 
-    /// This answer with its sentence on effects replaced by `effect`, for example to say that no effect was found.
+    /// This answer with its sentence on effects replaced by `effect`, for example to state that no effect was found.
     pub fn with_effect(self, effect: String) -> Answer {
         Answer { effect, ..self }
     }

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::{ANSWER_S, Seen, Stage, Subject};
 use crate::compare::result::{HorizonScore, StateScore};
 
-/// Magnitude of a change of the error, %, below which the error is said to stay.
+/// Magnitude of a change of the error, %, below which the error counts as unchanged.
 pub(super) const NOTICED: f64 = 0.05;
 
 /// Derivation of a model from the model before it.
