@@ -13,6 +13,7 @@ use greylag::model::{FlightConstants, GreyBox};
 use greylag::sysid::amend::{FittedFlight, Options, amend};
 use greylag::sysid::compare::scores;
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
+use greylag::sysid::per_flight::{PerFlight, SensorErrors};
 use greylag::sysid::progress::ignore_progress;
 
 use crate::aircraft::{self, Aircraft, numbered, pieces};
@@ -58,7 +59,8 @@ fn print_cut(aircraft: &Aircraft, cut: &Cut) -> Result<()> {
         let (fit, test) = aircraft.held_out(left);
         eprintln!("{}; held out: {}; {}", aircraft.name, test.name, cut.name);
         let flights = (cut.flights)(&fit);
-        let options = Options::default();
+        let per_flight = PerFlight { sensors: SensorErrors::Dropped, ..PerFlight::default() };
+        let options = Options { per_flight, ..Options::default() };
         let amended = match amend(&aircraft.model, &flights, &flights, &options, &ignore_progress) {
             Ok(amended) => amended,
             Err(why) => {

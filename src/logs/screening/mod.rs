@@ -27,22 +27,32 @@ use super::phases::{self, Flying, PhaseKind};
 /// Smallest number of rows for checks of units.
 const ENOUGH: usize = 50;
 
-/// Returns all findings about `rows`. `flies` states when the aircraft counts as flying.
-fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
+/// Returns all findings about `rows`. Then sets those sensor columns to NaN that are constant although the aircraft flies. `flies`
+/// states when the aircraft counts as flying.
+pub fn screened(rows: &mut [Sample], flies: &Flying) -> Vec<Finding> {
+    let (found, flown) = screen(rows, flies);
+    if flown {
+        dead::blank(rows);
+    }
+    found
+}
+
+/// All findings about `rows`, and whether the aircraft flies in them.
+fn screen(rows: &[Sample], flies: &Flying) -> (Vec<Finding>, bool) {
     if rows.is_empty() {
-        return vec![Finding::problem("the log has no rows with all needed channels")];
+        return (vec![Finding::problem("the log has no rows with all needed channels")], false);
     }
     let mut out = Vec::new();
+    let mut flies_at_all = false;
     if rows.len() >= ENOUGH {
         let flown = in_flight(rows, flies);
+        flies_at_all = !flown.is_empty();
         let of = |rows: &[Sample]| checks(rows, &in_flight(rows, flies), flies);
         out = cure::tried(checks(rows, &flown, flies), rows, of);
         let dead = dead::check(rows);
         // On the ground a channel may be constant, in a simulation exactly so. Without a flight only a constant
         // airspeed is reported.
-        out.extend(
-            dead.into_iter().filter(|f| !flown.is_empty() || f.text.starts_with("airspeed")),
-        );
+        out.extend(dead.into_iter().filter(|f| flies_at_all || f.text.starts_with("airspeed")));
         out.extend(dead::commands(&flown));
         let right = out.iter().all(|f| f.severity != Severity::Problem);
         if right {
@@ -50,17 +60,7 @@ fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
         }
     }
     out.extend(flight(rows, flies));
-    out
-}
-
-/// Returns all findings about `rows`, as [`screen`]. Then sets those sensor columns to NaN that are constant although the aircraft
-/// flies.
-pub fn screened(rows: &mut [Sample], flies: &Flying) -> Vec<Finding> {
-    let found = screen(rows, flies);
-    if rows.len() >= ENOUGH && !in_flight(rows, flies).is_empty() {
-        dead::blank(rows);
-    }
-    found
+    (out, flies_at_all)
 }
 
 /// Checks of units, signs and axes. They use the rows in wing-borne flight (`flown`) if there are enough, because

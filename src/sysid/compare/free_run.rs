@@ -124,7 +124,8 @@ fn fly_one(
                 .par_iter()
                 .map(|&start| {
                     let acting = correction.map(|c| c.from(&model, flight, segment, start));
-                    run(&model, flight, segment, start, [&looks[..], &[every]], acting)
+                    let wanted = Wanted { looks: &looks, keep: every };
+                    run(&model, flight, segment, start, wanted, acting)
                 })
                 .collect();
             for (start, (looks, path)) in starts.iter().zip(flown) {
@@ -170,7 +171,8 @@ pub fn from_moment(model: &GreyBox, flight: &Prepared, time_s: f64, seconds: f64
     let segment = flight.segments.iter().find(inside)?;
     let start = segment.partition_point(|i| i.time_s < time_s - 0.5 * flight.dt);
     let keep = ((seconds / flight.dt).round() as usize).max(1) + 1;
-    let (_, rows) = run(&flight.stepping(model), flight, segment, start, [&[], &[keep]], None);
+    let wanted = Wanted { looks: &[], keep };
+    let (_, rows) = run(&flight.stepping(model), flight, segment, start, wanted, None);
     let mut path = Path::default();
     for (instant, row) in segment[start..].iter().zip(rows) {
         path.time_s.push(instant.time_s);
@@ -182,17 +184,24 @@ pub fn from_moment(model: &GreyBox, flight: &Prepared, time_s: f64, seconds: f64
     Some(path)
 }
 
-/// Integrates one run from sample `start`. `looks` holds numbers of steps, and `keep` one number of samples. Returns the
-/// measured and the predicted state after each number of steps, and the predicted states of the first `keep` samples.
+/// Results that are wanted of a run.
+struct Wanted<'a> {
+    /// Numbers of steps after which the measured and the predicted state are returned, ascending.
+    looks: &'a [usize],
+    /// Number of samples, the first included, of which the predicted state is returned.
+    keep: usize,
+}
+
+/// Integrates one run from sample `start`. Returns what is [`Wanted`]: the pairs of measured and predicted state, and the
+/// predicted states.
 fn run(
     model: &GreyBox,
     flight: &Prepared,
     segment: &[Instant],
     start: usize,
-    [looks, keep]: [&[usize]; 2],
+    Wanted { looks, keep }: Wanted,
     mut correction: Option<Acting>,
 ) -> (Vec<Look>, Vec<[f64; 8]>) {
-    let keep = keep[0];
     let scale = model.scale();
     let mut memory = Memory::default();
     let advance = |k: usize, state: State, memory: &mut Memory| {

@@ -104,7 +104,7 @@ fn note(found: &str, errors: Option<(f64, f64)>, keep: bool) -> String {
         return format!("{found}. No held-out flight can validate this, so it is not kept.");
     };
     let said = if keep { "kept as [installation]" } else { "not kept" };
-    format!("{found}: {said}. The error of the held-out flights is {a:.5} with it, {b:.5} without.")
+    format!("{found}: {said}. The error of the free runs is {a:.5} with it, {b:.5} without.")
 }
 
 #[cfg(test)]
@@ -116,7 +116,7 @@ mod tests {
         let kept = note("Found", Some((0.1, 0.2)), true);
         assert_eq!(
             kept,
-            "Found: kept as [installation]. The error of the held-out flights is 0.10000 with it, 0.20000 without."
+            "Found: kept as [installation]. The error of the free runs is 0.10000 with it, 0.20000 without."
         );
         assert!(note("Found", Some((0.2, 0.1)), false).contains("not kept"));
         assert!(note("Found", None, false).contains("No held-out flight"));
