@@ -61,7 +61,7 @@ pub struct Arguments {
     /// of the prediction from the errors of the other runs.
     #[arg(long, value_name = "CSV")]
     predictions: Option<PathBuf>,
-    /// Use the deflections at the times that the log states for them, as `diagnose`, `amend` and the workbench do. Without this
+    /// Use the deflections at the times that the log states for them, as `diagnose` and `amend` do. Without this
     /// option, a significant delay of the log's actuator clock is corrected.
     #[arg(long)]
     recorded_clock: bool,

@@ -307,7 +307,8 @@ impl Bench {
             if places.is_empty() {
                 return Err(WorkbenchError::NoRole(Role::Test));
             }
-            let used = |k: &usize| inner.flights[*k].as_ref().ok().map(|f| f.prepared.clone());
+            let clock = inner.clock();
+            let used = |k: &usize| inner.flights[*k].as_ref().ok().map(|f| f.on(clock).1.clone());
             let flights: Vec<Prepared> = places.iter().filter_map(used).collect();
             let (amended, effects) = inner.amended()?;
             (inner.model.clone(), amended, effects, places, flights)

@@ -249,11 +249,12 @@ impl Bench {
             let (shown, (ways, models)) = (inner.shown(), inner.ways());
             // accepted effects do not change the comparison before a model with them is fitted or estimated
             let effects = if shown == "given" { &[] } else { &inner.session.effects[..] };
-            let key = format!("{}{shown}{ways:?}", inner.key("comparison", effects));
+            let clock = inner.clock();
+            let key = format!("{}{shown}{ways:?}{clock:?}", inner.key("comparison", effects));
             if let Some((_, known)) = inner.comparison.as_ref().filter(|(k, _)| *k == key) {
                 return Ok((ways, known.clone()));
             }
-            (key, ways, models, inner.reconstructions(&inner.seen()))
+            (key, ways, models, inner.flights_on(clock, &inner.seen()))
         };
         let made = compare(&models, &flights, &compare::Options::default(), &ignore_progress)?;
         let made = Arc::new(made);

@@ -9,6 +9,7 @@ use super::session::Role;
 use greylag_logs::csv::Tolerance;
 use greylag_logs::quoted;
 use greylag_sysid::amend::document::MODEL;
+use greylag_sysid::flight_path::ActuatorClock;
 
 /// The commands for the present session. A command is empty if the session lacks what it needs.
 #[derive(Clone, Debug, Serialize)]
@@ -57,10 +58,13 @@ impl Bench {
             true => String::new(),
             false => command,
         };
-        // the workbench uses the deflections at the times that the log states for them
+        let clock = match inner.clock() {
+            ActuatorClock::AsRecorded => " --recorded-clock",
+            ActuatorClock::Estimated => "",
+        };
         let compare = |logs: &str, roles: &[Role]| {
             let words = inner.reading_words(roles);
-            format!("greylag compare --model {model}{amended} --log{logs} --recorded-clock{words}")
+            format!("greylag compare --model {model}{amended} --log{logs}{clock}{words}")
         };
         let out = quoted(&folder);
         let to_fit = inner.reading_words(&[Role::Fit]);

@@ -30,6 +30,8 @@ pub struct Loaded {
     pub flight: Reconstruction,
     /// The flight, prepared for simulations and comparisons of models.
     pub prepared: Prepared,
+    /// The same with the deflections on the time base of the gyros; `None` if their recorded times need no correction.
+    corrected: Option<Box<(Reconstruction, Prepared)>>,
 }
 
 /// Values of a flight for a small plot.
@@ -74,12 +76,29 @@ impl Loaded {
         let flight = reconstruct(&log.flight, &options)?;
         let slowest = model.airframe.envelope.flying_from_mps();
         let prepared = Prepared::new(&flight, slowest)?;
+        let corrected = match flight.actuators_late() {
+            Some(_) => {
+                let flight = flight.clone().with_corrected_clock();
+                let prepared = Prepared::new(&flight, slowest)?;
+                Some(Box::new((flight, prepared)))
+            }
+            None => None,
+        };
         Ok(Arc::new(Loaded {
             info: Info::of(log),
             findings: log.findings.clone(),
             flight,
             prepared,
+            corrected,
         }))
+    }
+
+    /// The flight with the deflections on the time base `clock`.
+    pub fn on(&self, clock: ActuatorClock) -> (&Reconstruction, &Prepared) {
+        match &self.corrected {
+            Some(pair) if clock == ActuatorClock::Estimated => (&pair.0, &pair.1),
+            _ => (&self.flight, &self.prepared),
+        }
     }
 
     /// Reads the log of `entry`; a relative path is relative to `folder`.

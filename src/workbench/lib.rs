@@ -1,7 +1,7 @@
 //! The workbench: one session with flights, the errors of a model, the effects that it lacks, and the amended model.
 //!
 //! [`Bench`] contains the session and its results, and has no network access. [`server`] serves it to a browser on the same
-//! computer. The computations are those of the commands `compare --recorded-clock`, `diagnose` and `amend`.
+//! computer. The computations are those of the commands `compare`, `diagnose` and `amend`.
 
 mod act;
 mod bench;

@@ -10,9 +10,12 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use super::bench::Inner;
 use super::error::WorkbenchError;
 use super::flights::Loaded;
+use super::jobs::Work;
 use super::session::{LogEntry, Occasion, Opening, Role};
 use greylag_logs::names;
+use greylag_physics::inputs::Kind;
 use greylag_sysid::amend::split;
+use greylag_sysid::flight_path::ActuatorClock;
 use greylag_sysid::flight_path::reconstruction::Reconstruction;
 
 /// The flights for a fit and for its validation, with notes on their logs.
@@ -123,10 +126,15 @@ impl Inner {
         self.usable(&[Role::Fit, Role::HoldOut])
     }
 
-    /// The usable flights at the indices `places`.
+    /// The usable flights at the indices `places`, with the deflections at their recorded times.
     pub fn reconstructions(&self, places: &[usize]) -> Vec<Reconstruction> {
+        self.flights_on(ActuatorClock::AsRecorded, places)
+    }
+
+    /// The usable flights at the indices `places`, with the deflections on the time base `clock`.
+    pub fn flights_on(&self, clock: ActuatorClock, places: &[usize]) -> Vec<Reconstruction> {
         let of = |(k, name): (&usize, String)| {
-            let flight = self.flights[*k].as_ref().ok()?.flight.clone();
+            let flight = self.flights[*k].as_ref().ok()?.on(clock).0.clone();
             Some(Reconstruction { name, ..flight })
         };
         places.iter().zip(self.names(places)).filter_map(of).collect()
@@ -137,6 +145,20 @@ impl Inner {
         match self.usable(&[Role::Fit])[..] {
             [] => Err(WorkbenchError::NoRole(Role::Fit)),
             ref places => Ok(self.reconstructions(places)),
+        }
+    }
+
+    /// Time base of the deflections with which models are compared. It is that of the gyros, unless an input effect (a lag, a
+    /// delay) is accepted or asserted: this effect, not the log's clock, then explains the delay of the recorded deflections.
+    pub fn clock(&self) -> ActuatorClock {
+        let key = self.key(Work::Diagnosis.word(), &[]);
+        let known = self.diagnosis.as_ref().filter(|(of, _)| *of == key);
+        let found = known.and_then(|(_, diagnosis)| diagnosis["effects"].as_array());
+        let asserted = found.into_iter().flatten().filter(|e| e["asserted"] == true);
+        let accepted = self.session.effects.iter().map(|e| e.id.as_str());
+        match accepted.chain(asserted.filter_map(|e| e["id"].as_str())).any(is_input) {
+            true => ActuatorClock::AsRecorded,
+            false => ActuatorClock::Estimated,
         }
     }
 
@@ -168,6 +190,11 @@ impl Inner {
         };
         places.iter().zip(self.names(places)).flat_map(of).collect()
     }
+}
+
+/// Whether the effect `id` acts between the recorded and the acting deflections.
+fn is_input(id: &str) -> bool {
+    Kind::from_id(id).is_some()
 }
 
 /// Present time, s since 1970 (UTC).

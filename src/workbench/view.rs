@@ -23,6 +23,7 @@ use greylag_logs::finding::Finding;
 use greylag_logs::info::Purpose;
 use greylag_logs::phases::Phase;
 use greylag_sysid::compare::{self, FlightResult, ModelResult, compare, free_run};
+use greylag_sysid::flight_path::reconstruction::{Nuisance, Reconstruction};
 use greylag_sysid::progress::ignore_progress;
 
 /// Longest duration of a free run (simulation from a recorded state), s.
@@ -209,23 +210,24 @@ impl Bench {
     pub fn flight(&self, place: usize) -> Result<FlightData, WorkbenchError> {
         let flight = self.may_be_seen(place)?;
         let missing = WorkbenchError::NoFlight(place);
-        let ((ways, models), shared) = {
+        let ((ways, models), shared, clock) = {
             let inner = self.lock();
             let seen = inner.seen();
             let k = seen.iter().position(|k| *k == place);
-            (inner.ways(), k.map(|k| inner.names(&seen).swap_remove(k)))
+            (inner.ways(), k.map(|k| inner.names(&seen).swap_remove(k)), inner.clock())
         };
+        let (flown, prepared) = flight.on(clock);
         let ((ways, comparison), name) = match shared {
             Some(name) => (self.comparison()?, name),
             None => {
-                let flights = std::slice::from_ref(&flight.flight);
+                let flights = std::slice::from_ref(flown);
                 let made =
                     compare(&models, flights, &compare::Options::default(), &ignore_progress)?;
-                ((ways, Arc::new(made)), flight.flight.name.clone())
+                ((ways, Arc::new(made)), flown.name.clone())
             }
         };
         let k = comparison.flights.iter().position(|f| f.name == name).ok_or(missing)?;
-        Ok(data(&flight.prepared, &comparison, k, ways))
+        Ok(data(prepared, &comparison, k, ways))
     }
 
     /// Free runs of the models from one time of a flight.
@@ -235,10 +237,14 @@ impl Bench {
     /// opened, and `WorkbenchError::NotFlown` if the aircraft is not in flight at that time.
     pub fn free_run(&self, request: RunRequest) -> Result<FreeRun, WorkbenchError> {
         let flight = self.may_be_seen(request.flight)?;
-        let (ways, models) = self.lock().ways();
+        let ((ways, models), clock) = {
+            let inner = self.lock();
+            (inner.ways(), inner.clock())
+        };
+        let (_, prepared) = flight.on(clock);
         let seconds = request.seconds.clamp(0.1, LONGEST_S);
         let run = |(way, model): (&Way, &greylag_model::GreyBox)| {
-            let path = free_run::from_moment(model, &flight.prepared, request.time_s, seconds)?;
+            let path = free_run::from_moment(model, prepared, request.time_s, seconds)?;
             Some(OneRun {
                 way: *way,
                 model: model.name.clone(),
@@ -307,13 +313,15 @@ fn flight_view(inner: &Inner, (k, name): (usize, String)) -> FlightView<'_> {
         role: log.role,
         locked,
         error: loaded.err().map(String::as_str),
-        about: loaded.ok().map(|flight| about(flight, locked)),
+        about: loaded.ok().map(|flight| about(flight, flight.on(inner.clock()).0, locked)),
     }
 }
 
-fn about(flight: &Loaded, locked: bool) -> About<'_> {
+/// Summary of `flight`, of which `flown` is the reconstruction that is compared with models.
+fn about<'a>(flight: &'a Loaded, flown: &'a Reconstruction, locked: bool) -> About<'a> {
     let info = &flight.info;
-    let nuisance = |n: &greylag_sysid::flight_path::reconstruction::Nuisance| json!({ "name": n.name, "value": n.value, "sd": n.sd, "unit": n.unit });
+    let nuisance =
+        |n: &Nuisance| json!({ "name": n.name, "value": n.value, "sd": n.sd, "unit": n.unit });
     About {
         format: info.format,
         rate_hz: info.rate_hz,
@@ -324,8 +332,8 @@ fn about(flight: &Loaded, locked: bool) -> About<'_> {
         phases: &info.phases,
         purposes: &info.purposes,
         findings: &info.findings,
-        nuisances: flight.flight.nuisances.iter().map(nuisance).collect(),
-        notes: &flight.flight.notes,
+        nuisances: flown.nuisances.iter().map(nuisance).collect(),
+        notes: &flown.notes,
         strip: (!locked).then(|| flight.strip()),
     }
 }

@@ -196,7 +196,8 @@ fn actuators_that_come_late_are_put_right() {
     let flown = fly(60.0, air([0.0; 3], None), 3);
     let mut errors = Errors { noise: Errors::NOISE, ..Errors::NONE };
     errors.skew[6] = 0.007;
-    let found = reconstruct(spoil(&flown, &errors, 3), &options()).unwrap();
+    let corrected_at_once = reconstruct(spoil(&flown, &errors, 3), &options()).unwrap();
+    let found = corrected_at_once.clone();
     let skew = found.nuisances.iter().find(|n| n.name == "skew_actuators").unwrap();
     println!("{skew:?}");
     assert!((skew.value - 0.007).abs() < 3.0 * skew.sd && skew.sd < 0.002);
@@ -221,6 +222,15 @@ fn actuators_that_come_late_are_put_right() {
         // the uniform clock is the log's own, to rounding
         assert!((instant.controls.aileron - row.aileron_rad).abs() < 1e-9);
     }
+    // and corrected later, as the workbench does
+    assert!(found.actuators_late().is_some());
+    let later = found.with_corrected_clock();
+    assert!(later.actuators_late().is_none());
+    assert_eq!(later.notes, corrected_at_once.notes);
+    assert_eq!(
+        later.segments[0].instants[500].controls,
+        corrected_at_once.segments[0].instants[500].controls
+    );
 }
 
 #[test]

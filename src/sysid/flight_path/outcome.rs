@@ -43,6 +43,9 @@ const DISAGREEING: f64 = 4.0;
 const ALIGNED: [f64; 2] = [0.25 * DEGREE, 0.5 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
+/// Name of the delay of the recorded deflections among the nuisance parameters.
+const LATE: &str = "skew_actuators";
+
 /// Number of random draws of the error of the path. With three draws, the RMS errors over a flight are accurate to a few
 /// percent.
 const DRAWS: usize = 3;
@@ -72,23 +75,11 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     nuisances.extend(unmeasured_angles(problem, found, &segments, &left));
     let own = actuator_skew::by_axis(&segments, log.step, problem.sampling);
     let skew = actuator_skew::estimate(own, &erring, log.step, found.levels.gusts);
-    let late = late_beyond_doubt(&skew, log.step);
-    if late && options.actuators_clock == ActuatorClock::AsRecorded {
-        notes.push(format!(
-            "The recorded actuators seem {:.1} ms late against the gyros, by their clock or by a lag that \
-             the record does not show; they are left as recorded.",
-            1e3 * skew.late
-        ));
-    } else if late {
-        correct(&mut segments, &skew, log.step);
-        notes.push(format!(
-            "The recorded actuators came {:.1} ms late against the gyros and were corrected; a lag of \
-             the surfaces that the record does not show would look the same.",
-            1e3 * skew.late
-        ));
+    if late_beyond_doubt(&skew, log.step) {
+        notes.push(left_as_recorded(skew.late));
     }
     nuisances.push(Nuisance {
-        name: "skew_actuators".into(),
+        name: LATE.into(),
         value: skew.late,
         sd: skew.deviation,
         unit: "s",
@@ -96,7 +87,7 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     });
     let l = &found.levels;
     let m = &l.measured;
-    Ok(Reconstruction {
+    let flight = Reconstruction {
         name: options.name.clone(),
         step_s: log.step,
         sampling: problem.sampling,
@@ -107,7 +98,44 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
         force_noise: if log.has.force { l.force } else { [m[6].max(m[7]) / log.step; 3] },
         rudder: log.rudder,
         notes,
+    };
+    Ok(match options.actuators_clock {
+        ActuatorClock::AsRecorded => flight,
+        ActuatorClock::Estimated => flight.with_corrected_clock(),
     })
+}
+
+impl Reconstruction {
+    /// Delay of the recorded deflections against the gyros, if it is significant and they are still as recorded; else `None`.
+    pub fn actuators_late(&self) -> Option<Skew> {
+        let found = self.nuisances.iter().find(|n| n.name == LATE)?;
+        let skew = Skew { late: found.value, deviation: found.sd };
+        self.notes.contains(&left_as_recorded(skew.late)).then_some(skew)
+    }
+
+    /// The flight with the deflections on the time base of the gyros ([`ActuatorClock::Estimated`]): a significant delay is
+    /// removed, otherwise the flight is returned unchanged.
+    pub fn with_corrected_clock(mut self) -> Reconstruction {
+        let Some(skew) = self.actuators_late() else { return self };
+        correct(&mut self.segments, &skew, self.step_s);
+        let note = left_as_recorded(skew.late);
+        self.notes.retain(|n| *n != note);
+        self.notes.push(format!(
+            "The recorded actuators came {:.1} ms late against the gyros and were corrected; a lag of \
+             the surfaces that the record does not show would look the same.",
+            1e3 * skew.late
+        ));
+        self
+    }
+}
+
+/// Note on deflections that are `late` (s) and not corrected.
+fn left_as_recorded(late: f64) -> String {
+    format!(
+        "The recorded actuators seem {:.1} ms late against the gyros, by their clock or by a lag that \
+         the record does not show; they are left as recorded.",
+        1e3 * late
+    )
 }
 
 /// Simulates the error of the path in random copies of the flight. Returns the root mean square error of each state, and the
