@@ -19,11 +19,15 @@ use crate::sysid::per_flight::{PerFlight, SensorErrors};
 /// by eye have such errors.
 const ASKEW_DEG: f64 = 3.0;
 
+/// Name of the structure with a linear residual.
+const LINEAR_RESIDUAL: &str = "--tune-only, then train residual";
+
 /// The structures to compare:
 /// - the model as given,
 /// - a fit of its coefficients,
 /// - the same fit; the sensor errors common to the fitted flights then also correct the flight left out,
 /// - the same fit with additional constants of each flight: trim coefficients, misalignment angles of the sensor axes, or both,
+/// - the same fit, followed by a linear residual (`greylag train residual`),
 /// - a fit in which physical bounds are the only prior,
 /// - a fit with each of `effects` added, and with all of them added, both with the constants of each flight in `asked`.
 pub fn structures(effects: &[Added], asked: PerFlight) -> Vec<Structure> {
@@ -44,6 +48,7 @@ pub fn structures(effects: &[Added], asked: PerFlight) -> Vec<Structure> {
         of("--tune-only --flight-trims".into(), &[], trims),
         of(format!("--tune-only --axes-askew {askew_deg}"), &[], axes),
         of(format!("--tune-only --flight-trims --axes-askew {askew_deg}"), &[], both),
+        Structure { name: LINEAR_RESIDUAL.into(), fitted: Fitted::LinearResidual },
         Structure { name: "--tune-only --from-scratch".into(), fitted: Fitted::FromScratch },
     ];
     let alone =
@@ -87,6 +92,10 @@ pub fn run(
         Some(s) if s.free == 0 => {
             println!("The model as given predicts flights left out as well as any fit: keep it.");
         }
+        Some(s) if s.structure == LINEAR_RESIDUAL => println!(
+            "The simplest within one standard error of the best is a fit with a linear residual: fit with --tune-only --fit-all, \
+             then give the fitted model and the same logs to greylag train residual."
+        ),
         Some(s) => println!(
             "The simplest within one standard error of the best is {}; fit it to all flights with --fit-all.",
             s.structure

@@ -10,6 +10,7 @@ use super::amendment::{Added, joined};
 use super::error::AmendError;
 use super::flight::Flight;
 use super::judge::{IMPROVED, Judge, judged, judged_at};
+use super::linear_residual;
 use super::output_error::{self, FitOptions};
 use super::parameters;
 use crate::compare::forecast;
@@ -44,6 +45,8 @@ pub enum Fitted {
         /// Constants estimated for each flight.
         per_flight: PerFlight,
     },
+    /// The model's coefficients, and then a linear residual of the fitted model (see [`linear_residual`]).
+    LinearResidual,
     /// All coefficients of the model, including those with the value zero. The physical bounds are their only prior.
     FromScratch,
 }
@@ -187,24 +190,42 @@ fn error_of(
     let error = |model: &GreyBox| judged(&scores(model, test, &[set.at])).unwrap_or(f64::NAN);
     let (start, options) = match fitted {
         Fitted::Nothing => return Ok(Ok(error(model))),
+        Fitted::LinearResidual => (
+            model.clone(),
+            FitOptions { per_flight: unjudged(&PerFlight::default()), ..FitOptions::default() },
+        ),
         Fitted::FromScratch => {
             let per_flight = PerFlight { sensors: SensorErrors::Dropped, ..PerFlight::default() };
             (parameters::from_scratch(model), FitOptions { per_flight, ..FitOptions::default() })
         }
         Fitted::Coefficients { effects, per_flight } => {
             let added = effects.iter().map(|a| a.id.clone()).collect();
-            // no other flight is left to judge the common sensor errors
-            let sensors = match per_flight.sensors {
-                SensorErrors::Kept => SensorErrors::Kept,
-                SensorErrors::Judged | SensorErrors::Dropped => SensorErrors::Dropped,
-            };
-            let per_flight = PerFlight { sensors, ..*per_flight };
+            let per_flight = unjudged(per_flight);
             let options = FitOptions { added, per_flight, ..FitOptions::default() };
             (with(model, effects)?, options)
         }
     };
     let fit = output_error::fit(&start, &others, &options, &ignore_progress);
-    Ok(fit.map(|fit| error(&fit.model)))
+    Ok(fit.map(|fit| match fitted {
+        Fitted::LinearResidual => error(&corrected(fit.model, set, left)),
+        _ => error(&fit.model),
+    }))
+}
+
+/// `per_flight` without common sensor errors, unless they are kept in any case: no other flight is left to judge them.
+fn unjudged(per_flight: &PerFlight) -> PerFlight {
+    let sensors = match per_flight.sensors {
+        SensorErrors::Kept => SensorErrors::Kept,
+        SensorErrors::Judged | SensorErrors::Dropped => SensorErrors::Dropped,
+    };
+    PerFlight { sensors, ..*per_flight }
+}
+
+/// `model` with its linear residual over all flights except the one with the index `left`; `model` if no residual helps.
+fn corrected(model: GreyBox, set: &Set, left: usize) -> GreyBox {
+    let others = set.judged.iter().enumerate().filter(|(k, _)| *k != left);
+    let others: Vec<Prepared> = others.map(|(_, f)| f.prepared.clone()).collect();
+    linear_residual::fit(&model, &others, &[set.at]).map_or(model, |found| found.model)
 }
 
 fn with(model: &GreyBox, effects: &[Added]) -> Result<GreyBox, AmendError> {
@@ -217,6 +238,7 @@ fn with(model: &GreyBox, effects: &[Added]) -> Result<GreyBox, AmendError> {
 fn free(model: &GreyBox, fitted: &Fitted) -> Result<usize, AmendError> {
     Ok(match fitted {
         Fitted::Nothing => 0,
+        Fitted::LinearResidual => parameters::free(model, &[]).len() + linear_residual::FREE,
         Fitted::FromScratch => parameters::free(&parameters::from_scratch(model), &[]).len(),
         Fitted::Coefficients { effects, per_flight } => {
             let ids: Vec<&str> = effects.iter().map(|a| a.id.as_str()).collect();

@@ -14,6 +14,7 @@ mod flight;
 mod interval;
 mod judge;
 mod learned;
+pub mod linear_residual;
 pub mod leave_one_out;
 mod normal;
 pub mod output_error;
