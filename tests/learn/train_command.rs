@@ -126,3 +126,31 @@ fn what_is_missing_is_said() {
     let unplanned = greylag(&["collect", "--out", &out, "--round", "1"]);
     assert!(said(&unplanned).contains("--model"), "{}", said(&unplanned));
 }
+
+#[test]
+fn a_linear_residual_is_written_where_it_helps() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let made = greylag(&["mystery", "--seed", "31", "--out", &at("m")]);
+    assert!(made.status.success(), "{}", said(&made));
+    let [model, one, two, test] =
+        ["model.toml", "train-1.csv", "train-2.csv", "test-1.csv"].map(|f| at(&format!("m/{f}")));
+    let train = |model: &str, out: &str| {
+        let logs = ["--log", &one, &two, "--hold-out", &test];
+        let line = [["train", "residual", "--model", model, "--out", out].as_slice(), &logs];
+        greylag(&line.concat())
+    };
+    let done = train(&model, &at("r"));
+    assert!(done.status.success(), "{}", said(&done));
+    let corrected = at("r/model.toml");
+    let compared =
+        greylag(&["compare", "--model", &model, &corrected, "--log", &test, "--json", "-"]);
+    let result: Value = serde_json::from_slice(&compared.stdout).unwrap();
+    let error = |k: usize| result["models"][k]["free_run"][1]["rmse_scaled"].as_f64().unwrap();
+    assert!(error(1) < 0.99 * error(0), "{} to {}", error(0), error(1));
+    // neither a second residual nor a file is replaced
+    let again = train(&corrected, &at("s"));
+    assert!(said(&again).contains("has a learned residual already"), "{}", said(&again));
+    let there = train(&model, &at("r"));
+    assert!(!there.status.success() && said(&there).contains("--force"), "{}", said(&there));
+}
