@@ -373,7 +373,7 @@ mod tests {
             "roll 29°, pitch 6°",
             "Error against surface travel",
             // a load factor of 2.25 exceeds the limit of 2.2 by less than the transient margin
-            "load factor 2.20, stall 12.3°",
+            "load factor – to 2.20, stall 12.3°",
             "<td>Outside the load factor (s)</td><td class=\"number\">1.00 [1.00, 1.00], worst 1.00</td>",
             "Graham and Lathrop",
         ] {
