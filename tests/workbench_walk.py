@@ -140,6 +140,16 @@ def foreign_sockets(pid):
 
 
 CHOSEN = "document.querySelector('.grid button[aria-pressed=true]')?.dataset.channel"
+# Cells of a channel, chosen one after the other, whose channel and variable the sentence under the grid does not name.
+OTHERS = """
+(channel => [...document.querySelectorAll('.grid button')].filter(b => b.dataset.channel === channel).map(b => b.dataset.variable).filter(variable => {
+  const cell = document.querySelector(`.grid button[data-channel="${channel}"][data-variable="${variable}"]`);
+  const name = cell.getAttribute('aria-label').split(':')[0].toLowerCase();
+  cell.click();
+  const said = document.querySelector('.finding').textContent.toLowerCase();
+  return !said.startsWith(name) && !said.includes('little is left');
+}))('CHANNEL')
+"""
 # Cells of the grid that stand outside of its pane, or under its neighbours.
 CUT = """(() => { const scroll = document.querySelector('#failing .scroll'); const box = scroll.getBoundingClientRect();
 return [...scroll.querySelectorAll('td, th')].filter(e => { const r = e.getBoundingClientRect(); return r.right > box.right + 1 || r.left < box.left - 1 || r.right > innerWidth; }).length; })()"""
@@ -151,6 +161,8 @@ def where_the_tuned_model_fails(browser, acts_in):
     wait(browser, "document.querySelector('[data-base=tuned][aria-pressed=true]')", 120, "where the tuned model fails")
     if browser.value(CHOSEN) != acts_in:
         found.append(f"the worst cell of the tuned model is in {browser.value(CHOSEN)}, the verdict is about {acts_in}")
+    if others := browser.value(OTHERS.replace("CHANNEL", acts_in)):
+        found.append(f"the sentence under the grid is not about the chosen cell: {acts_in} over {', '.join(others)}")
     r2 = "[...document.querySelectorAll('.grid td.fit')].map(e => e.textContent).join()"
     tuned = browser.value(r2)
     click(browser, "[data-base=given]")

@@ -7,7 +7,7 @@ mod tables;
 mod targets;
 
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
@@ -19,6 +19,7 @@ use serde::Serialize;
 
 use crate::commands::files::{self, shipped};
 use crate::commands::start::{self, StartArguments};
+use crate::commands::terminal::print_next;
 use crate::commands::{bar, choices, controllers, fly};
 use crate::control::cem::Change;
 use crate::control::envelope::Guarded;
@@ -183,8 +184,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         .iter()
         .map(|e| one(arguments.seed, e, &courses, &limits, &plant))
         .collect::<Result<Vec<_>>>()?;
+    let then = next(arguments, &evaluations, &plant);
     if !files::is_stdout(arguments.json.as_deref()) {
         tables::print(&evaluations);
+        print_next(&then);
     }
     if let Some(path) = &arguments.json {
         let document = Document {
@@ -200,7 +203,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     if let Some(path) = &arguments.report {
         let flights = flights(&entrants, &plant)?;
-        files::write(path, &page(arguments, &evaluations, &flights, &plant), overwrite)?;
+        files::write(path, &page(arguments, &evaluations, &flights, then), overwrite)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -227,7 +230,7 @@ fn page(
     arguments: &Arguments,
     evaluations: &[Evaluation],
     flights: &[(Target, Vec<Tracking>)],
-    plant: &PlantOptions,
+    next: String,
 ) -> String {
     let provenance = [
         ("targets", arguments.targets.display().to_string()),
@@ -240,26 +243,37 @@ fn page(
         subtitle: subtitle(arguments),
         evaluations,
         flights,
-        next: next(arguments, evaluations, plant),
+        next,
         provenance: provenance.map(|(k, v)| (k.into(), v)).to_vec(),
     };
     report.page().render()
 }
 
-/// The `greylag demo` command for the best controller. It is empty if several models or policies were given, because the
-/// controller's name does not say which of them it used. It is also empty for a user's own aircraft, because the command
-/// would have to repeat the options of the aircraft.
+/// The `greylag demo` command for the best controller. It is empty if several models were given, or several policies and the
+/// controller uses one, because the controller's name does not say which of them it used. It is also empty for a user's own
+/// aircraft, because the command would have to repeat the options of the aircraft.
 fn next(arguments: &Arguments, evaluations: &[Evaluation], plant: &PlantOptions) -> String {
-    match (evaluation_best(evaluations), &arguments.models[..], &arguments.policies[..]) {
-        (Some(best), [model], [policy]) if plant.aircraft_dir.is_none() => format!(
-            "greylag demo --aircraft {} --controller {} --model {} --policy {}",
-            plant.aircraft,
-            best.controller,
-            quoted(model),
-            quoted(policy)
-        ),
-        _ => String::new(),
+    let best = evaluation_best(evaluations);
+    let kind =
+        arguments.controllers.iter().find(|k| best.is_some_and(|e| e.controller == k.name()));
+    let (Some(kind), [model], None) = (kind, &arguments.models[..], &plant.aircraft_dir) else {
+        return String::new();
+    };
+    let mut command = format!("greylag demo --aircraft {} --controller {kind}", plant.aircraft);
+    if model != Path::new(fly::MODEL) {
+        command += &format!(" --model {}", quoted(model));
     }
+    match (kind.needs(), &arguments.policies[..]) {
+        (Needs::Gains | Needs::Model, _) => (),
+        (_, [policy]) if policy == Path::new(controllers::POLICY) => (),
+        (_, [policy]) => command += &format!(" --policy {}", quoted(policy)),
+        _ => return String::new(),
+    }
+    if kind.searches() && !arguments.changes.is_empty() {
+        command += " --planner";
+        arguments.changes.iter().for_each(|change| command += &format!(" {change}"));
+    }
+    command
 }
 
 /// Description of the evaluation in one line.

@@ -121,8 +121,13 @@ pub fn print_answer(answer: &Answer) {
 /// Prints the last lines of a command: its summary, and the command to run next.
 pub fn print_summary(answer: &Answer) {
     println!("\n{}", answer.summary());
-    if !answer.next.is_empty() {
-        println!("next: {}", answer.next);
+    print_next(&answer.next);
+}
+
+/// Prints the command to run next; nothing if it is empty.
+pub fn print_next(command: &str) {
+    if !command.is_empty() {
+        println!("next: {command}");
     }
 }
 

@@ -35,13 +35,25 @@ pub struct Level {
     pub path: f64,
 }
 
-/// The recommended controller, the LQI or the damped LQI (with other weights), and its delay margin.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+/// Name of the LQI in the registry of controllers.
+const LQI: &str = "lqi";
+
+/// The recommended controller, the LQI or the damped LQI (with other weights), and its margins.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Advised {
     /// Name of the controller in the registry.
     pub name: &'static str,
     /// Smallest delay margin of the controller's loops at the cruise airspeed, s.
     pub delay_s: f64,
+    /// Stability margins of each loop of the controller at the cruise airspeed.
+    pub loops: Vec<LoopMargins>,
+}
+
+impl Advised {
+    fn new(name: &'static str, loops: Vec<LoopMargins>) -> Advised {
+        let delay_s = loops.iter().map(|l| l.delay).fold(f64::INFINITY, f64::min);
+        Advised { name, delay_s, loops }
+    }
 }
 
 /// Results of [`check`] at the model's reference altitude.
@@ -62,6 +74,16 @@ pub struct AircraftCheck {
     pub loops: Vec<LoopMargins>,
     /// Findings to correct before a flight, most severe first.
     pub findings: Vec<String>,
+}
+
+impl AircraftCheck {
+    /// The loops of the LQI, then those of the recommended controller if it is another one. Each comes with the name of its
+    /// controller.
+    pub fn named_loops(&self) -> impl Iterator<Item = (&'static str, &LoopMargins)> {
+        let Advised { name, loops, .. } = &self.controller;
+        let advised = loops.iter().filter(move |_| *name != LQI).map(move |l| (*name, l));
+        self.loops.iter().map(|l| (LQI, l)).chain(advised)
+    }
 }
 
 /// Reason why a model cannot be checked.
@@ -87,32 +109,29 @@ pub fn check(model: &GreyBox) -> Result<AircraftCheck, CheckError> {
     let span = envelope.airspeed_max_mps - envelope.airspeed_min_mps;
     let speeds =
         (0..SPEEDS).map(|i| envelope.airspeed_min_mps + span * i as f64 / (SPEEDS - 1) as f64);
+    let loops = lqi::margins(model, cruise, &Weights::DEFAULT)?;
     let mut check = AircraftCheck {
         levels: speeds.clone().filter_map(|v| level(model, v, altitude)).collect(),
         modes: modes(model, cruise, altitude)?,
         level_up_to: fastest_level(model),
-        controller: advised(model)?,
+        controller: advised(model, &loops)?,
         authority: Authority::at(model, &trim, altitude),
-        loops: lqi::margins(model, cruise, &Weights::DEFAULT)?,
+        loops,
         findings: Vec::new(),
     };
     check.findings = findings(model, &check, speeds.count());
     Ok(check)
 }
 
-/// Recommends the LQI if its delay margin is at least [`USUAL_DELAY`]. Otherwise recommends the one of LQI and damped LQI
-/// that has the larger delay margin.
-fn advised(model: &GreyBox) -> Result<Advised, CheckError> {
-    let cruise = model.airframe.envelope.airspeed_cruise_mps;
-    let least = |weights: &Weights| -> Result<f64, MarginsError> {
-        let loops = lqi::margins(model, cruise, weights)?;
-        Ok(loops.iter().map(|l| l.delay).fold(f64::INFINITY, f64::min))
-    };
-    let plain = Advised { name: "lqi", delay_s: least(&Weights::DEFAULT)? };
+/// Recommends the LQI, which has the margins `loops`, if its delay margin is at least [`USUAL_DELAY`]. Otherwise recommends the one
+/// of LQI and damped LQI that has the larger delay margin.
+fn advised(model: &GreyBox, loops: &[LoopMargins]) -> Result<Advised, CheckError> {
+    let plain = Advised::new(LQI, loops.to_vec());
     if plain.delay_s >= USUAL_DELAY {
         return Ok(plain);
     }
-    let damped = Advised { name: "lqi-damped", delay_s: least(&Weights::DAMPED)? };
+    let cruise = model.airframe.envelope.airspeed_cruise_mps;
+    let damped = Advised::new("lqi-damped", lqi::margins(model, cruise, &Weights::DAMPED)?);
     Ok(if damped.delay_s > plain.delay_s { damped } else { plain })
 }
 
@@ -197,7 +216,7 @@ fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String
         let by_envelope = matches!(why, SetupError::Design { .. });
         out.push(format!("{why}{}", if by_envelope { remedy } else { "" }));
     }
-    let Advised { name, delay_s } = check.controller;
+    let Advised { name, delay_s, .. } = check.controller;
     if delay_s < USUAL_DELAY {
         out.push(format!(
             "the loops of {name} tolerate {:.0} ms of delay, sensors, link and servos have up to {:.0} ms: make the link \

@@ -1,4 +1,4 @@
-//! The HTML page about an aircraft: three views, and trim, modes, LQI loops and control responses computed from its model.
+//! The HTML page about an aircraft: three views, and trim, modes, stability margins and control responses computed from its model.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -47,8 +47,8 @@ impl AircraftReport<'_> {
                 vec![Figure::Table(self.modes())],
             ),
             Section::new(
-                "Loops of the LQI",
-                "Change of the loop's gain, phase lag and delay that it tolerates.",
+                "Stability margins",
+                "Change of gain, phase lag and delay that each loop tolerates. A controller tolerates the least of its delays.",
                 vec![Figure::Table(self.loops())],
             ),
             Section::new("Provenance", "", vec![Figure::Table(self.provenance())]).folded(),
@@ -69,7 +69,7 @@ impl AircraftReport<'_> {
         let AircraftCheck { findings, level_up_to, controller, .. } = self.check;
         let envelope = self.model.airframe.envelope;
         let mut details = vec![format!(
-            "Controller to begin with: {}; its loops tolerate {:.0} ms of delay.",
+            "Controller to begin with: {}; its loops tolerate {:.0} ms of delay (stability margins below).",
             controller.name,
             1e3 * controller.delay_s
         )];
@@ -155,6 +155,7 @@ impl AircraftReport<'_> {
 
     fn loops(&self) -> Table {
         let columns = [
+            ("Controller", Left),
             ("Loop", Left),
             ("Crossover (rad/s)", Right),
             ("Least gain (dB)", Right),
@@ -162,16 +163,21 @@ impl AircraftReport<'_> {
             ("Phase (°)", Right),
             ("Delay (ms)", Right),
         ];
-        let mut table = Table::new("Loops", &columns);
-        for l in &self.check.loops {
+        let mut table = Table::new("Stability margins", &columns);
+        for (controller, l) in self.check.named_loops() {
             let decibel = |x: f64| match x.is_finite() && x > 0.0 {
                 true => number(20.0 * x.log10()),
                 false => "any".into(),
             };
             let [least, most] = l.gain.map(decibel);
-            let [crossover, phase, delay] =
-                [l.crossover, l.phase.to_degrees(), 1e3 * l.delay].map(number);
-            table.push([l.surface.to_string(), crossover, least, most, phase, delay]);
+            let [crossover, phase] = [l.crossover, l.phase.to_degrees()].map(number);
+            // as many digits as in the sentence on the controller to begin with
+            let delay = match l.delay.is_finite() {
+                true => format!("{:.0}", 1e3 * l.delay),
+                false => "any".into(),
+            };
+            let [controller, surface] = [controller, l.surface].map(str::to_string);
+            table.push([controller, surface, crossover, least, most, phase, delay]);
         }
         table
     }

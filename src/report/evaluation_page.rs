@@ -2,6 +2,7 @@
 //! planners.
 
 pub(crate) mod answer;
+pub(crate) mod names;
 mod way;
 
 use super::Align::{Left, Right};
@@ -16,6 +17,7 @@ use greylag_model::STEP;
 use greylag_sim::evaluation::Evaluation;
 use greylag_sim::published::{Published, Value, published};
 use greylag_sim::tracking::{Tracking, seconds};
+use names::{label, only_model};
 
 /// Results of an evaluation with their provenance.
 #[derive(Clone, Debug)]
@@ -216,21 +218,6 @@ impl EvaluationReport<'_> {
     }
 }
 
-/// Name of a controller, with the name of its model or policy if `all` have several.
-fn label(e: &Evaluation, all: &[Evaluation]) -> String {
-    match e.model == "-" || only_model(all).is_some() {
-        true => e.controller.clone(),
-        false => format!("{} ({})", e.controller, e.model),
-    }
-}
-
-/// The model or policy that all controllers share, except those that need none; `None` if there are several.
-fn only_model(all: &[Evaluation]) -> Option<&str> {
-    let mut models = all.iter().map(|e| e.model.as_str()).filter(|model| *model != "-");
-    let first = models.next()?;
-    models.all(|model| model == first).then_some(first)
-}
-
 fn name(target: &Target) -> String {
     let [roll, pitch] = [target.roll, target.pitch].map(f64::to_degrees);
     format!("roll {roll:.0}°, pitch {pitch:.0}°")
@@ -312,6 +299,10 @@ mod tests {
         all[2].model = "prior".into();
         let named: Vec<String> = all.iter().map(|e| label(e, &all)).collect();
         assert_eq!(named, ["lqi (exact <model>)", "pid", "lqi (prior)"]);
+        // one policy beside the one model is no difference
+        all[2].model = "exact <model>, policies/one".into();
+        assert_eq!(only_model(&all), Some("exact <model>, policies/one"));
+        assert_eq!(all.iter().map(|e| label(e, &all)).collect::<Vec<_>>(), ["lqi", "pid", "lqi"]);
     }
 
     #[test]
@@ -382,7 +373,7 @@ mod tests {
             "roll 29°, pitch 6°",
             "Error against surface travel",
             // a load factor of 2.25 exceeds the limit of 2.2 by less than the transient margin
-            "load factor 2.20, stall 12.3°",
+            "load factor – to 2.20, stall 12.3°",
             "<td>Outside the load factor (s)</td><td class=\"number\">1.00 [1.00, 1.00], worst 1.00</td>",
             "Graham and Lathrop",
         ] {

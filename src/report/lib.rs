@@ -58,6 +58,8 @@ pub use effect_page::{EffectReport, facts as effect_facts};
 pub use evaluation_page::EvaluationReport;
 #[cfg(feature = "sitl")]
 pub use evaluation_page::answer::{best as evaluation_best, sentences as evaluation_answer};
+#[cfg(feature = "sitl")]
+pub use evaluation_page::names::only_model as evaluation_model;
 pub use flight::{
     Difficulty, EnvelopeFlown, Event, EventKind, FlightReport, Segment, SurfaceTravel,
 };

@@ -35,6 +35,11 @@ fn evaluate_writes_scores_as_json_and_never_over_a_file() {
     let arguments = ["evaluate", "--controller", "pid", "lqi", "--targets", targets, "--json", out];
     let output = greylag(&arguments);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    // the last line is a command that flies the best controller; the model of all is named once
+    let said = String::from_utf8(output.stdout).unwrap();
+    let next = said.lines().next_back().unwrap();
+    assert!(next.starts_with("next: greylag demo --aircraft x8 --controller "), "{said}");
+    assert!(said.contains("model of all controllers that need one: prior-severe-learned"));
     let scores: serde_json::Value = serde_json::from_slice(&fs::read(&json).unwrap()).unwrap();
     assert_eq!(scores["schema"], "greylag.evaluation/1");
     let lqi = &scores["controllers"][1];

@@ -24,6 +24,19 @@ fn the_shipped_aircraft_can_be_flown() {
     }
 }
 
+/// The delay that the recommended controller tolerates is that of one of the loops that page and terminal list.
+#[test]
+fn the_delay_of_the_advice_is_that_of_a_listed_loop() {
+    for path in ["params/x8/jsbsim.toml", "params/aerosonde/jsbsim.toml"] {
+        let found = check(&model(path)).unwrap();
+        let advised = &found.controller;
+        let own = || found.named_loops().filter(|(name, _)| *name == advised.name);
+        let least = own().map(|(_, l)| l.delay).fold(f64::INFINITY, f64::min);
+        assert_eq!(least, advised.delay_s, "{path}: {advised:?}");
+        assert_eq!(own().count(), found.loops.len(), "{path}");
+    }
+}
+
 #[test]
 fn a_reversed_surface_and_a_weak_motor_are_said() {
     let mut wrong = model("params/aerosonde/jsbsim.toml");

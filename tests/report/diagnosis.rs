@@ -236,6 +236,32 @@ fn the_box_says_where_the_tuned_model_fails() {
     assert!(none.contains("Nearest suspects, none proven"));
 }
 
+/// The table of the tuned model states the share that the bars state. The comparison alone has 11 % of lift in its first model.
+#[test]
+fn the_table_and_the_bars_state_the_same_share() {
+    let d = report_diagnosis::diagnosis();
+    let failing = report_comparison::comparison(60.0);
+    let held_out = report_diagnosis::held_out(report_comparison::comparison(60.0));
+    let page = report(&d, Some([&failing, &held_out])).page();
+    let figures: Vec<&Figure> = page.sections.iter().flat_map(|s| &s.figures).collect();
+    let maps = figures.iter().find_map(|figure| match figure {
+        Figure::Choice(choice) if choice.anchor == "fails" => Some(choice),
+        _ => None,
+    });
+    let Figure::Grid(tuned) = &maps.expect("there are maps").options[0].figures[0] else {
+        panic!("the first map is no table");
+    };
+    let bars = figures.iter().find_map(|figure| match figure {
+        Figure::Bars(bars) if bars.title == "Left unexplained" => Some(bars),
+        _ => None,
+    });
+    let lift = tuned.rows.iter().find(|row| row.label == "L lift").expect("lift has a row");
+    let bar = bars.expect("there are bars").groups.iter().find(|g| g.label == "L lift");
+    // 0.182 in the diagnosis
+    assert_eq!(lift.cells[0].text, "18 %");
+    assert!((bar.expect("lift has a bar").values[0] - 18.2).abs() < 1e-9);
+}
+
 /// The parameter on which the flights differ most stands first, whatever its place in the effect.
 #[test]
 fn the_parameter_on_which_the_flights_differ_comes_first() {

@@ -86,7 +86,7 @@ pub fn page(file: &Path, model: &GreyBox) -> Result<String> {
     Ok(report.page().render())
 }
 
-/// Prints trim, modes, control authority and the stability margins of the LQI's loops, then what should be corrected.
+/// Prints trim, modes, control authority and the stability margins of the loops, then what should be corrected.
 pub fn print(found: &AircraftCheck) {
     println!("\n{}", levels(found));
     println!("\n{}", modes(found));
@@ -105,7 +105,7 @@ pub fn print(found: &AircraftCheck) {
     if let Some(fastest) = found.level_up_to {
         println!("cannot fly level above {fastest:.1} m/s: faster is a descent at full throttle");
     }
-    let controller = found.controller;
+    let controller = &found.controller;
     println!(
         "controller to begin with: {}, whose loops tolerate {:.0} ms of delay",
         controller.name,
@@ -168,9 +168,10 @@ fn modes(found: &AircraftCheck) -> Table {
 fn loops(found: &AircraftCheck) -> Table {
     let decibel =
         |x: f64| if x.is_finite() { format!("{:.1}", 20.0 * x.log10()) } else { "any".into() };
-    let rows = found.loops.iter().map(|l| {
+    let rows = found.named_loops().map(|(controller, l)| {
         let [least, most] = l.gain;
         vec![
+            controller.to_owned(),
             l.surface.to_owned(),
             format!("{:.1}", l.crossover),
             if least > 0.0 { decibel(least) } else { "any".into() },
@@ -180,7 +181,8 @@ fn loops(found: &AircraftCheck) -> Table {
         ]
     });
     let header = [
-        "LQI loop",
+        "controller",
+        "loop",
         "crossover, rad/s",
         "least gain, dB",
         "most gain, dB",

@@ -5,7 +5,7 @@ use comfy_table::{ContentArrangement, Table};
 
 use crate::commands::terminal::broken;
 use crate::control::quality::{Measure, measure};
-use crate::report::evaluation_answer;
+use crate::report::{evaluation_answer, evaluation_model};
 use crate::sim::evaluation::{Evaluation, Score};
 use crate::sim::published::published;
 
@@ -34,6 +34,9 @@ const SHOWN: [&str; 13] = [
 /// Prints the tables, the definitions of their terms, and the conclusion.
 pub(super) fn print(evaluations: &[Evaluation]) {
     tables(evaluations).iter().for_each(|table| println!("{table}"));
+    if let Some(model) = evaluation_model(evaluations) {
+        println!("{}", broken(&format!("model of all controllers that need one: {model}")));
+    }
     println!(
         "medians with 95 % intervals (bootstrap over the targets), then the worst; definitions: --report"
     );
@@ -51,12 +54,17 @@ pub(super) fn print(evaluations: &[Evaluation]) {
 pub(super) fn tables(evaluations: &[Evaluation]) -> Vec<Table> {
     let Some(first) = evaluations.first() else { return Vec::new() };
     let groups = first.groups.iter().map(|score| score.targets.as_str());
+    let name = &|e: &Evaluation| match evaluation_model(evaluations) {
+        Some(_) => e.controller.clone(),
+        None => format!("{}\n{}", e.controller, e.model),
+    };
     groups
-        .flat_map(|group| evaluations.chunks(BESIDE).map(move |some| table(group, some)))
+        .flat_map(|group| evaluations.chunks(BESIDE).map(move |some| table(group, some, name)))
         .collect()
 }
 
-fn table(group: &str, evaluations: &[Evaluation]) -> Table {
+/// The table of one group of targets. `name` gives the heading of a controller's column.
+fn table(group: &str, evaluations: &[Evaluation], name: &dyn Fn(&Evaluation) -> String) -> Table {
     let scored: Vec<(&Evaluation, &Score)> =
         evaluations.iter().filter_map(|e| Some((e, e.score(group)?))).collect();
     let mut table = Table::new();
@@ -64,7 +72,7 @@ fn table(group: &str, evaluations: &[Evaluation]) -> Table {
     table.set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH);
     let count = scored.first().map_or(0, |(_, score)| score.count);
     let mut header = vec![format!("{group}, n = {count}")];
-    header.extend(scored.iter().map(|(e, _)| format!("{}\n{}", e.controller, e.model)));
+    header.extend(scored.iter().map(|(e, _)| name(e)));
     table.set_header(header);
     let mut push = |title: &str, cell: &dyn Fn(&Evaluation, &Score) -> String| {
         let cells = scored.iter().map(|(e, score)| cell(e, score));

@@ -3,6 +3,7 @@
 use crate::comparison::page::channel_name;
 use crate::diagnosis::DiagnosisReport;
 use crate::diagnosis::{place, proof, suspects, tables};
+use crate::kit::bars::value_text;
 use crate::kit::html::file_names;
 use crate::kit::numbers::percent;
 use crate::{
@@ -97,34 +98,42 @@ pub(crate) fn channel_of(symbol: &str) -> String {
 
 fn where_it_fails(d: &Diagnosis, failing: Option<&Comparison>) -> Section {
     let mut figures = Vec::new();
-    figures.extend(failing.and_then(maps));
+    figures.extend(failing.and_then(|c| maps(d, c)));
     if !d.channels.is_empty() {
         figures.push(left(d));
         figures.push(worst(d));
     }
-    let note = "The share of each channel's variation that is neither explained by the model nor by \
-                the sensors' noise. “Tuned” is the model with its own coefficients fitted first: \
+    let note = "Left, in the table and in the bars: the share of each channel's variation that is neither explained by \
+                the model nor by the sensors' noise. “Tuned” is the model with its own coefficients fitted first: \
                 what is left then is for a missing effect to explain. What tuning takes away was wrong \
                 coefficients, no missing effect.";
     Section::new("Where it fails", note, figures)
 }
 
 /// Maps of the channels' residuals over the regime variables (those that describe the flight condition), one map for each model.
-/// The first map is shown initially.
-fn maps(c: &Comparison) -> Option<Figure> {
+/// The first map, that of the tuned model, is shown initially.
+fn maps(d: &Diagnosis, c: &Comparison) -> Option<Figure> {
     // the colours of all maps have the same scale
-    let options: Vec<ChoiceOption> = c
-        .models
-        .iter()
-        .filter_map(|m| Some(ChoiceOption { name: m.name.clone(), figures: vec![map(m)?] }))
-        .collect();
+    let option = |(k, m): (usize, &ModelResult)| {
+        let of = (k == 0).then_some(d);
+        Some(ChoiceOption { name: m.name.clone(), figures: vec![map(m, of)?] })
+    };
+    let options: Vec<ChoiceOption> = c.models.iter().enumerate().filter_map(option).collect();
     let choice = Choice { anchor: "fails".into(), label: "Model".into(), options };
     (!choice.options.is_empty()).then_some(Figure::Choice(choice))
 }
 
+/// The unexplained share of a channel of the comparison. For the tuned model it is the share that the diagnosis `tuned` states, as
+/// in the bars and in the answer: the diagnosis and the comparison fit the coefficients by different methods.
+fn unexplained(channel: &ChannelResult, tuned: Option<&Diagnosis>) -> f64 {
+    let symbol = channel.channel.symbol();
+    let stated = tuned.and_then(|d| d.channels.iter().find(|ch| ch.channel == symbol));
+    stated.map_or(channel.unexplained_fraction, |ch| ch.tuned_unexplained_fraction)
+}
+
 /// Map with a row for each channel and a column for each regime variable: the share of the residual's variance that the variable
-/// explains.
-fn map(model: &ModelResult) -> Option<Figure> {
+/// explains. `tuned` is the diagnosis if `model` is its tuned model.
+fn map(model: &ModelResult, tuned: Option<&Diagnosis>) -> Option<Figure> {
     let channels = &model.channels;
     let variables: Vec<RegimeVariable> = RegimeVariable::CONTINUOUS
         .into_iter()
@@ -135,12 +144,16 @@ fn map(model: &ModelResult) -> Option<Figure> {
         return None;
     }
     let row = |ch: &ChannelResult| {
-        let share = ch.unexplained_fraction;
-        let mut cells = vec![GridCell { text: format!("{} %", percent(share)), weight: 0.0 }];
-        cells.extend(variables.iter().map(|v| cell(ch, *v)));
+        let left = unexplained(ch, tuned);
+        let text = if left.is_finite() { value_text(100.0 * left, "%") } else { "–".into() };
+        let mut cells = vec![GridCell { text, weight: 0.0 }];
+        cells.extend(variables.iter().map(|v| cell(ch, left, *v)));
         GridRow { label: channel_name(ch.channel), cells }
     };
-    let mut columns = vec![("left".to_string(), "share that is unexplained".to_string())];
+    let mut columns = vec![(
+        "left".to_string(),
+        "share of the channel's variation that is unexplained".to_string(),
+    )];
     columns.extend(variables.iter().map(|v| (sign(*v).to_string(), v.name().to_string())));
     Some(Figure::Grid(Grid {
         title: format!("Unexplained share by channel and variable, {}", model.name),
@@ -151,14 +164,14 @@ fn map(model: &ModelResult) -> Option<Figure> {
     }))
 }
 
-fn cell(channel: &ChannelResult, variable: RegimeVariable) -> GridCell {
+/// The cell of a channel of which the share `left` is unexplained.
+fn cell(channel: &ChannelResult, left: f64, variable: RegimeVariable) -> GridCell {
     let found = channel.bins.iter().find(|b| b.variable == variable);
     let share = found.map_or(0.0, |b| b.explained);
     if share.is_nan() || share < BLANK {
         return GridCell { text: String::new(), weight: 0.0 };
     }
     // The cells of a channel are pale if its unexplained fraction is below 10 %.
-    let left = channel.unexplained_fraction;
     let importance = if left.is_finite() { (left / 0.1).clamp(0.0, 1.0) } else { 0.0 };
     GridCell { text: percent(share), weight: share * importance }
 }

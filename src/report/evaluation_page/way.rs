@@ -135,11 +135,12 @@ fn limits(report: &EvaluationReport) -> String {
     let Some(limits) = report.evaluations.iter().find_map(|e| e.limits) else {
         return String::new();
     };
-    let [slow, fast] = limits.airspeed_mps;
+    let [[least, most], [slow, fast]] = [limits.load_factor, limits.airspeed_mps];
     format!(
-        "Limits of the airframe file: load factor {}, stall {}°, airspeed {} to {} m/s, bank {}°, surface rate {} a second; \
+        "Limits of the airframe file: load factor {} to {}, stall {}°, airspeed {} to {} m/s, bank {}°, surface rate {} a second; \
          – where none is stated.",
-        number(limits.load_factor[1]),
+        number(least),
+        number(most),
         number(limits.stall_deg),
         number(slow),
         number(fast),

@@ -93,17 +93,25 @@ pub(super) fn clause(kept: &Kept, limits: &Limits) -> String {
     format!("{}: {}", outside(kept), loads(kept, limits))
 }
 
-/// Phrase with the load factors and the largest angle of attack, each with its limit.
+/// Phrase with the load factors and the largest angle of attack, each with its limits.
 pub(super) fn loads(kept: &Kept, limits: &Limits) -> String {
-    let of = |value: f64, limit: f64, unit: &str| {
-        let stated =
-            if limit.is_finite() { format!(" of {}{unit}", number(limit)) } else { String::new() };
-        format!("{}{unit}{stated}", number(value))
+    let [least, most] = kept.load_factor.map(number);
+    let load = format!("load factor {least} to {most}{}", load_limits(limits.load_factor));
+    let stall = match limits.stall_deg {
+        stall if stall.is_finite() => format!(" of {}°", number(stall)),
+        _ => String::new(),
     };
-    let [least, most] = kept.load_factor;
-    let load = format!("load factor {} to {}", number(least), of(most, limits.load_factor[1], ""));
-    let alpha = format!("angle of attack up to {}", of(kept.alpha_deg, limits.stall_deg, "°"));
-    format!("{load}, {alpha}")
+    format!("{load}, angle of attack up to {}°{stall}", number(kept.alpha_deg))
+}
+
+/// The smallest and the largest permitted load factor in parentheses; empty if the airframe file states neither.
+fn load_limits([least, most]: [f64; 2]) -> String {
+    match (least.is_finite(), most.is_finite()) {
+        (true, true) => format!(" (limits {} to {})", number(least), number(most)),
+        (false, true) => format!(" (at most {}, no lower limit stated)", number(most)),
+        (true, false) => format!(" (at least {}, no upper limit stated)", number(least)),
+        (false, false) => String::new(),
+    }
 }
 
 /// Whether the aircraft left the envelope. Short excesses of load factor and angle of attack that `Kept::kept` allows do not
@@ -176,7 +184,7 @@ pub(crate) fn section(report: &FlightReport) -> Option<Section> {
         "Limits of the aircraft: load factor {}, stall {}°, airspeed {} m/s, bank {}°, pitch {}°; – where none is stated. \
          Load factor: specific force along body z, upwards, over the standard gravity. Integral of |roll error| + |pitch \
          error|. Surface travel: sum of |changes| of the commands, −1..1. Select a target to see its time in every plot.",
-        number(limits.load_factor[1]),
+        range(limits.load_factor),
         number(limits.stall_deg),
         range(limits.airspeed_mps),
         number(limits.bank_deg),
@@ -207,5 +215,6 @@ mod tests {
         };
         assert!(said(3.0).starts_with("the envelope was not judged"), "{}", said(3.0));
         assert!(said(20.0).starts_with("inside the envelope"), "{}", said(20.0));
+        assert!(said(20.0).contains(" (limits −1.00 to 2.20), "), "{}", said(20.0));
     }
 }

@@ -58,7 +58,8 @@ impl Bars {
     }
 }
 
-fn value_text(value: f64, unit: &str) -> String {
+/// Text of a bar's value with its unit.
+pub(crate) fn value_text(value: f64, unit: &str) -> String {
     match value {
         v if !v.is_finite() => "cannot be determined".into(),
         v if v.abs() >= 1e4 => format!("{v:.1e} {unit}"),

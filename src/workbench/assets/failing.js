@@ -215,7 +215,27 @@ function finding() {
   const found = bench.diagnosis?.effects.filter((e) => e.asserted && e.channels.includes(channel?.channel)).map((e) => e.id) ?? [];
   const left = channel?.unexplained_fraction;
   const small = found.length > 0 && left != null && left < 0.001;
-  parts.finding.textContent = small ? `${capital(channel.name)}: little is left (${show(Math.max(0, 100 * left), 2)} %), and an effect explains it: ${found.join(" or ")}` : capital(channel?.worst_regime ?? "");
+  const said = small ? `${capital(channel.name)}: little is left (${show(Math.max(0, 100 * left), 2)} %), and an effect explains it: ${found.join(" or ")}`
+    : capital(of_cell(channel, over(channel), worst()) ?? channel?.worst_regime ?? "");
+  parts.finding.replaceChildren(el("span", {}, said));
+}
+/** Sentences on the chosen cell: the share of the residual's variance, and the bin with the largest mean residual. Null if the flights
+ *  cannot judge the channel, or if there are no bins. */
+function of_cell(channel, variable, bin) {
+  if (!channel || channel.abstained || !variable || bin?.mean == null) return null;
+  const [low, high] = (bin.interval ?? []).map((end) => end ?? NaN);
+  // half width of the 95 % interval on the side of zero
+  const half = bin.mean > 0 ? bin.mean - low : high - bin.mean;
+  const error = `${show(Math.abs(bin.mean))}${half > 0 ? ` ± ${show(half, 2)}` : ""} ${channel.unit} ${bin.mean < 0 ? "below" : "above"} the model on average`;
+  const unclear = low <= 0 && high >= 0 ? ", not clearly different from zero" : "";
+  return `${channel.name} over ${variable.name}: ${percent(variable.explained)} of the residual's variance goes with it. `
+    + `Largest error at ${variable.name} ${range(bin, variable.unit)}: measured ${error}${unclear}${bin.supported ? "" : ", from few samples"}.`;
+}
+/** The range of a bin with its unit, such as "8 to 11°" or "above 0.6". An end that is null is open. */
+function range(bin, unit) {
+  const edge = (x) => String(+x.toPrecision(4)).replace("-", "−");
+  const words = bin.low == null ? (bin.high == null ? "of all values" : `below ${edge(bin.high)}`) : bin.high == null ? `above ${edge(bin.low)}` : `${edge(bin.low)} to ${edge(bin.high)}`;
+  return unit && (bin.low != null || bin.high != null) ? `${words}${unit === "°" ? "" : " "}${unit}` : words;
 }
 
 // ---- over time ----
@@ -335,8 +355,8 @@ function time() {
   const rest = (model) => measured.map((m, i) => (m == null || model[i] == null ? null : m - model[i]));
   const bin = worst();
   const variable = over(channel);
-  const range = bin ? `${SYMBOL[pick.variable]} ${bin.low == null ? "under " + show(bin.high) : bin.high == null ? "over " + show(bin.low) : show(bin.low) + " to " + show(bin.high)} ${variable.unit}` : "";
-  parts.residual.caption.replaceChildren(el("b", {}, `Residual: measured − model (${channel.unit})`), ...(bin ? [key("lit", `${range}: ${show(bin.mean)} ${channel.unit} on average`)] : []));
+  const lit_range = bin ? `${SYMBOL[pick.variable]} ${range(bin, variable.unit)}` : "";
+  parts.residual.caption.replaceChildren(el("b", {}, `Residual: measured − model (${channel.unit})`), ...(bin ? [key("lit", `${lit_range}: ${show(bin.mean)} ${channel.unit} on average`)] : []));
   draw(parts.residual.plot, clock([{}, line("before", 1.4), ...(after ? [line("after", 1.4)] : [])], spans), [x, rest(before), ...(after ? [rest(after)] : [])]);
   parts.variable.caption.replaceChildren(el("b", {}, variable ? `${capital(variable.name)}${variable.unit ? ` (${variable.unit})` : ""}` : ""));
   draw(parts.variable.plot, clock([{}, line("measured", 1.2)], spans), [x, flight.regimes[pick.variable] ?? x.map(() => null)]);
