@@ -1,7 +1,7 @@
 //! Sentences of an evaluation's answer: the best controller, its worst target, the other controllers, lost targets.
 
 use super::label;
-use crate::kit::numbers::number;
+use crate::kit::numbers::{attitude, number};
 use greylag_sim::evaluation::{Evaluation, Score};
 
 /// Group of targets over which controllers are ranked if the evaluation contains it.
@@ -92,23 +92,15 @@ fn outside(score: &Score) -> Option<usize> {
 fn worst_target(best: &Evaluation) -> Option<String> {
     let known = best.flights.iter().filter(|f| f.settled_deg.is_finite());
     if let Some(f) = known.max_by(|a, b| a.settled_deg.total_cmp(&b.settled_deg)) {
-        let [roll, pitch] = f.to_deg.map(whole);
         return Some(format!(
-            "Its worst target: roll {roll}°, pitch {pitch}°, settled error {}°.",
+            "Its worst target: {}, settled error {}°.",
+            attitude(f.to_deg),
             number(f.settled_deg)
         ));
     }
     let groups = best.groups.iter().filter(|s| s.targets != ALL);
     let worst = groups.max_by(|a, b| a.max_deg.total_cmp(&b.max_deg))?;
     Some(format!("Its worst target has a settled error of {}°.", number(worst.max_deg)))
-}
-
-/// An angle rounded to a degree, with its sign.
-fn whole(deg: f64) -> String {
-    match deg.round() {
-        0.0 => "0".into(),
-        deg => format!("{deg:+.0}").replace('-', "−"),
-    }
 }
 
 /// Sentences on the controllers behind the best one: `rest` keep the envelope as often as the best one, `leaving` do not.

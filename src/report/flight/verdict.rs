@@ -3,7 +3,7 @@
 
 use crate::flight::quality::{clause, kept, left, loads, most, outside};
 use crate::flight::{Difficulty, FlightReport, Segment};
-use crate::kit::numbers::number;
+use crate::kit::numbers::{attitude, number};
 use crate::{LoopTiming, Outcome, Verdict};
 use greylag_control::quality::TRANSIENT;
 use greylag_logs::Sample;
@@ -159,7 +159,7 @@ fn slowest(report: &FlightReport) -> Option<String> {
     let qualities = report.qualities().filter(|all| all.len() > 1)?;
     let timed = report.segments.iter().zip(&qualities).filter(|(_, q)| q.to_one_deg_s.is_finite());
     let (segment, _) = timed.max_by(|a, b| a.1.to_one_deg_s.total_cmp(&b.1.to_one_deg_s))?;
-    Some(format!("slowest to {}", attitude(segment)))
+    Some(format!("slowest to {}", target(segment)))
 }
 
 /// Text on the largest settled error, with its target; `None` without a finite error.
@@ -169,18 +169,13 @@ fn largest_error(segments: &[Segment]) -> Option<String> {
     Some(format!(
         "largest settled error {}, at {}",
         degrees(worst.settled_error_rad),
-        attitude(worst)
+        target(worst)
     ))
 }
 
-/// The target of a segment, in whole degrees.
-fn attitude(segment: &Segment) -> String {
-    let whole = |rad: f64| match rad.to_degrees().round() {
-        0.0 => "0".into(),
-        deg => format!("{deg:+.0}").replace('-', "−"),
-    };
-    let [roll, pitch] = [segment.roll_target_rad, segment.pitch_target_rad].map(whole);
-    format!("roll {roll}°, pitch {pitch}°")
+/// The target of a segment in words.
+fn target(segment: &Segment) -> String {
+    attitude([segment.roll_target_rad, segment.pitch_target_rad].map(f64::to_degrees))
 }
 
 /// Text on the mean settled error of each group of targets; `None` without a finite error.

@@ -17,6 +17,16 @@ pub(crate) fn number(value: f64) -> String {
     text.replace('-', "−")
 }
 
+/// Formats a commanded attitude (roll and pitch, degrees) in whole degrees with signs.
+pub(crate) fn attitude(deg: [f64; 2]) -> String {
+    let whole = |deg: f64| match deg.round() {
+        0.0 => "0".into(),
+        deg => format!("{deg:+.0}").replace('-', "−"),
+    };
+    let [roll, pitch] = deg.map(whole);
+    format!("roll {roll}°, pitch {pitch}°")
+}
+
 /// Formats evidence (a test statistic) with one decimal, without decimals from 100 on; a dash for NaN and infinity.
 pub(crate) fn evidence(value: f64) -> String {
     let text = match value {
