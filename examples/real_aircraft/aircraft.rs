@@ -122,7 +122,8 @@ fn dawn_one() -> Result<Aircraft> {
     )
 }
 
-fn thor() -> Result<Aircraft> {
+/// Reads the Ultra Stick.
+pub fn thor() -> Result<Aircraft> {
     let measures = [1.959, 1.257, 0.3093];
     of_halves("Ultra Stick 25e (thor), 2 kg, vanes: 2 parts of one flight", "thor", measures, None)
 }

@@ -32,14 +32,23 @@ pub enum Kind {
 }
 
 impl Kind {
-    fn all() -> Vec<Kind> {
+    /// All corrections that are tried. The first is [`Kind::Nothing`].
+    pub fn all() -> Vec<Kind> {
         let observers = PAST_S.iter().flat_map(|&past_s| {
             DECAY_S.iter().map(move |&decay_s| Kind::Observer(Observer { past_s, decay_s }))
         });
-        let linear = ORDERS.iter().flat_map(|&order| {
+        [Kind::Nothing].into_iter().chain(observers).chain(Kind::of_order_and_ridge()).collect()
+    }
+
+    /// The linear residuals that are tried. The first is [`Kind::Nothing`].
+    pub fn linear() -> Vec<Kind> {
+        [Kind::Nothing].into_iter().chain(Kind::of_order_and_ridge()).collect()
+    }
+
+    fn of_order_and_ridge() -> impl Iterator<Item = Kind> {
+        ORDERS.iter().flat_map(|&order| {
             RIDGES.iter().map(move |&ridge| Kind::Linear(Choice { order, ridge }))
-        });
-        [Kind::Nothing].into_iter().chain(observers).chain(linear).collect()
+        })
     }
 
     /// The correction in words.
@@ -80,15 +89,16 @@ pub fn errors(
     }
 }
 
-/// The correction with the smallest error over `parts`, each predicted by `fitted`, a function that fits a model to all others.
+/// The correction among `kinds` with the smallest error over `parts`, each predicted by `fitted`, a function that fits a model to
+/// all others. The first of `kinds` is [`Kind::Nothing`].
 ///
 /// The error is the geometric mean over the horizons of the mean over the parts. The model alone is taken unless a correction
 /// lowers the error by more than 1 %.
 pub fn chosen(
+    kinds: &[Kind],
     parts: &[Reconstruction],
     fitted: impl Fn(&[Reconstruction]) -> Option<GreyBox>,
 ) -> Result<Kind> {
-    let kinds = Kind::all();
     let mut sums = vec![[(0.0, 0.0); HORIZONS_S.len()]; kinds.len()];
     for left in 0..parts.len() {
         let mut others = parts.to_vec();

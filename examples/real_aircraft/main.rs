@@ -6,15 +6,18 @@
 //! are fewer than three.
 //!
 //! With `-- --learning-curve > results/real-learning-curve.txt` the same is done with less and less training data
-//! (`learning_curve.rs`). With `-- --cuts` the same training data are fitted whole and cut (`cuts.rs`).
+//! (`learning_curve.rs`). With `-- --cuts` the same training data are fitted whole and cut (`cuts.rs`). With
+//! `-- --outside [SETS] > results/outside.txt` models that were fitted inside an envelope are judged outside of it (`outside.rs`).
 
 mod aircraft;
 mod corrected;
 mod cuts;
 mod learning_curve;
 mod least_squares;
+mod outside;
+mod outside_flights;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use greylag::model::GreyBox;
 use greylag::sysid::amend::leave_one_out::{Fitted, Structure, leave_one_out};
 use greylag::sysid::amend::{Options, amend};
@@ -26,6 +29,7 @@ use greylag::sysid::progress::ignore_progress;
 use greylag::sysid::weak_form::prepared::Prepared;
 
 use aircraft::{numbered, pieces};
+use corrected::Kind;
 use least_squares::least_squares;
 
 /// Horizons of the free runs, s.
@@ -76,7 +80,15 @@ fn main() -> Result<()> {
         [] => table(),
         ["--learning-curve"] => learning_curve::print(),
         ["--cuts"] => cuts::print(),
-        _ => bail!("give nothing, --learning-curve or --cuts, not {}", asked.join(" ")),
+        ["--outside"] => outside::print(outside::SETS),
+        ["--outside", sets] => {
+            let wrong = || format!("{sets}: write the number of sets after --outside");
+            outside::print(sets.parse().with_context(wrong)?)
+        }
+        _ => {
+            let asked = asked.join(" ");
+            bail!("give nothing, --learning-curve, --cuts or --outside [SETS], not {asked}")
+        }
     }
 }
 
@@ -155,7 +167,8 @@ fn judged(
         errors[place] = scaled(&scores(model, test, &HORIZONS_S)?);
     }
     if corrections == Corrections::Tried {
-        let correction = corrected::chosen(&parts, |others| tuned(model, others, structure))?;
+        let correction =
+            corrected::chosen(&Kind::all(), &parts, |others| tuned(model, others, structure))?;
         errors[CORRECTED] = corrected::errors(&fitted, fit, test, correction)?;
         named = format!("{named}, {}", correction.in_words());
     }
