@@ -8,6 +8,11 @@ use greylag_model::GreyBox;
 use greylag_num::stream::{Stream, stream};
 use greylag_physics::formula::Written;
 
+mod kinds;
+
+use kinds::OF_THE_MODEL;
+pub use kinds::{KINDS, MissingKind, SERVOS};
+
 /// Id of the random stream of missing effects.
 const DRAW: u64 = 80;
 
@@ -82,7 +87,8 @@ impl Craft {
         };
         let thrust = |id| id == "propeller" && self.has("thrust_table");
         let taken = OF_THE_MODEL.iter().filter(|kind| self.has(kind.id) || thrust(kind.id));
-        KINDS.iter().filter(own).chain(taken).map(|kind| self.sized(kind)).collect()
+        let all = KINDS.iter().filter(own).chain(taken).chain(&SERVOS);
+        all.map(|kind| self.sized(kind)).collect()
     }
 
     /// The effect `id` with this aircraft's amplitudes; `None` if it cannot be missing.
@@ -127,100 +133,6 @@ const WRITTEN: Sizes = Sizes {
     airspeed: 16.67,
     stiffness: -0.4629,
 };
-
-/// An effect that can be missing.
-#[derive(Clone, Copy, Debug)]
-pub struct MissingKind {
-    /// Id of the effect in the catalogue.
-    pub id: &'static str,
-    /// Unit of the amplitude; empty if dimensionless.
-    pub unit: &'static str,
-    /// Range of amplitudes that are identifiable in a few minutes of flight while the aircraft remains flyable.
-    pub clear: [f64; 2],
-    /// Whether the amplitude may be negative.
-    pub either_sign: bool,
-}
-
-const fn kind(id: &'static str, unit: &'static str, clear: [f64; 2]) -> MissingKind {
-    MissingKind { id, unit, clear, either_sign: false }
-}
-
-const fn both(id: &'static str, unit: &'static str, clear: [f64; 2]) -> MissingKind {
-    MissingKind { id, unit, clear, either_sign: true }
-}
-
-/// Effects that can be missing if the aircraft's model has them. They are removed from the model. The simulator stays as it is.
-const OF_THE_MODEL: [MissingKind; 2] =
-    [kind("rudder_linear", "", [1.0, 1.0]), kind("propeller", "", [1.0, 1.0])];
-
-/// The other effects that can be missing, with amplitudes for the size of the X8.
-pub const KINDS: [MissingKind; 26] = [
-    kind("drag_alpha2", "1/rad²", [0.6, 1.2]),
-    kind("drag_beta2", "1/rad²", [0.5, 1.2]),
-    kind("drag_elevator_abs", "1/rad", [0.08, 0.16]),
-    kind("lift_stall", "", [1.0, 1.0]),
-    kind("pitch_break", "1/rad³", [-3.0, -1.5]),
-    both("cg_shift", "m", [0.008, 0.016]),
-    kind("unsteady_lift", "", [2.0, 4.0]),
-    kind("thrust_decay", "", [0.3, 0.5]),
-    kind("thrust_scale", "N", [-10.0, -8.0]),
-    both("thrust_line_offset", "m", [0.02, 0.04]),
-    both("motor_torque", "N m", [0.4, 1.0]),
-    both("propeller_gyro", "N m s", [0.04, 0.1]),
-    kind("propwash", "", [0.3, 0.6]),
-    kind("aeroelastic_loss", "", [0.1, 0.2]),
-    kind("actuator_lag", "s", [0.02, 0.05]),
-    kind("time_delay", "s", [0.02, 0.03]),
-    kind("dead_zone", "rad", [0.015, 0.035]),
-    kind("backlash", "rad", [0.02, 0.06]),
-    kind("rate_limit", "rad/s", [1.6, 2.4]),
-    kind("mass_error", "", [0.1, 0.2]),
-    // positive only: at −0.1 the X8's inertia matrix is nearly singular, and no controller can fly it
-    kind("inertia_xz", "kg m²", [0.06, 0.1]),
-    both("asymmetry", "", [0.002, 0.004]),
-    both("dihedral_alpha", "1/rad²", [0.3, 0.6]),
-    both("roll_control_alpha", "1/rad²", [0.3, 0.5]),
-    kind("effectiveness_saturation", "1/rad²", [-2.0, -1.0]),
-    kind("thrust_lag", "s", [0.2, 0.6]),
-];
-
-impl MissingKind {
-    /// The effect `id`, with amplitudes for an aircraft of the size of the X8.
-    pub fn from_id(id: &str) -> Option<MissingKind> {
-        KINDS.iter().chain(&OF_THE_MODEL).copied().find(|kind| kind.id == id)
-    }
-
-    /// A clearly identifiable amplitude drawn from `seed`.
-    pub fn amplitude(&self, seed: u64) -> f64 {
-        let mut random = stream(seed, &[DRAW, 1]);
-        let [low, high] = self.clear;
-        let size = if low < high { random.random_range(low..high) } else { low };
-        let signed = if self.either_sign && random.random::<bool>() { -size } else { size };
-        self.allowed(rounded(signed))
-    }
-
-    /// The largest |amplitude| at which the aircraft still follows its schedule. For a rate limit it is the smallest one.
-    pub fn most(&self) -> f64 {
-        let largest = self.clear[0].abs().max(self.clear[1].abs());
-        match self.id {
-            "rate_limit" => self.clear[0],
-            // beyond this value the inertia matrix is not positive definite
-            "inertia_xz" => largest,
-            // −29 N would cancel the whole thrust
-            "thrust_scale" | "mass_error" => 2.0 * largest,
-            _ => 3.0 * largest,
-        }
-    }
-
-    /// `amplitude`, rounded if it is a delay: the simulator represents only delays of a whole number of 10 ms steps.
-    pub fn allowed(&self, amplitude: f64) -> f64 {
-        if self.id == "time_delay" {
-            (100.0 * amplitude).round().max(1.0) / 100.0
-        } else {
-            amplitude
-        }
-    }
-}
 
 /// Rounds to four significant figures.
 pub(super) fn rounded(x: f64) -> f64 {
@@ -321,7 +233,8 @@ impl Missing {
         })
     }
 
-    /// An effect with a clear amplitude, both drawn from `seed`. `id` and `amplitude` replace the drawn ones if they are given.
+    /// An effect with a clear amplitude, both drawn from `seed`. `id` and `amplitude` replace the drawn ones if they are given. A
+    /// wrong servo is an error of calibration and not drawn: `id` must name it.
     ///
     /// # Errors
     ///
@@ -333,7 +246,8 @@ impl Missing {
         amplitude: Option<f64>,
     ) -> Result<Missing, MissingError> {
         let mut random: Stream = stream(seed, &[DRAW]);
-        let kinds = craft.kinds();
+        let mut kinds = craft.kinds();
+        kinds.retain(|kind| SERVOS.iter().all(|servo| servo.id != kind.id));
         let any = kinds[random.random_range(0..kinds.len() as u32) as usize];
         let id = id.unwrap_or(any.id);
         let clear = craft.kind(id).map_or(0.0, |kind| kind.amplitude(seed));
@@ -358,7 +272,7 @@ mod tests {
     #[test]
     fn whatever_the_simulator_can_hide_can_be_missing() {
         let x8 = craft("params/x8/jsbsim.toml");
-        assert_eq!(x8.kinds().len(), KINDS.len());
+        assert_eq!(x8.kinds().len(), KINDS.len() + SERVOS.len());
         for effect in &EFFECTS {
             let kind =
                 MissingKind::from_id(effect.id).unwrap_or_else(|| panic!("no {}", effect.id));
@@ -391,7 +305,7 @@ mod tests {
 
     #[test]
     fn clear_amplitudes_can_be_flown() {
-        for kind in KINDS.iter().filter(|kind| kind.id != "rate_limit") {
+        for kind in KINDS.iter().chain(&SERVOS).filter(|kind| kind.id != "rate_limit") {
             assert!(kind.clear.iter().all(|x| x.abs() <= kind.most()), "{}", kind.id);
         }
         let limit = MissingKind::from_id("rate_limit").unwrap();

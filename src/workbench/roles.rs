@@ -13,7 +13,7 @@ use super::flights::Loaded;
 use super::jobs::Work;
 use super::session::{LogEntry, Occasion, Opening, Role};
 use greylag_logs::names;
-use greylag_physics::inputs::Kind;
+use greylag_physics::inputs::{Acts, Kind};
 use greylag_sysid::amend::split;
 use greylag_sysid::flight_path::ActuatorClock;
 use greylag_sysid::flight_path::reconstruction::Reconstruction;
@@ -148,15 +148,15 @@ impl Inner {
         }
     }
 
-    /// Time base of the deflections with which models are compared. It is that of the gyros, unless an input effect (a lag, a
-    /// delay) is accepted or asserted: this effect, not the log's clock, then explains the delay of the recorded deflections.
+    /// Time base of the deflections with which models are compared. It is that of the gyros, unless an effect between recorded and
+    /// acting deflections (a lag, a delay) is accepted or asserted: it, not the log's clock, then explains why they come late.
     pub fn clock(&self) -> ActuatorClock {
         let key = self.key(Work::Diagnosis.word(), &[]);
         let known = self.diagnosis.as_ref().filter(|(of, _)| *of == key);
         let found = known.and_then(|(_, diagnosis)| diagnosis["effects"].as_array());
         let asserted = found.into_iter().flatten().filter(|e| e["asserted"] == true);
         let accepted = self.session.effects.iter().map(|e| e.id.as_str());
-        match accepted.chain(asserted.filter_map(|e| e["id"].as_str())).any(is_input) {
+        match accepted.chain(asserted.filter_map(|e| e["id"].as_str())).any(delays) {
             true => ActuatorClock::AsRecorded,
             false => ActuatorClock::Estimated,
         }
@@ -192,9 +192,9 @@ impl Inner {
     }
 }
 
-/// Whether the effect `id` acts between the recorded and the acting deflections.
-fn is_input(id: &str) -> bool {
-    Kind::from_id(id).is_some()
+/// Whether the effect `id` can delay both surfaces.
+fn delays(id: &str) -> bool {
+    Kind::from_id(id).is_some_and(|kind| kind.acts() == Acts::OnSurfaces)
 }
 
 /// Present time, s since 1970 (UTC).

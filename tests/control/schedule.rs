@@ -9,7 +9,7 @@ use greylag::physics::Command;
 use greylag::sim::flight_test::{FlightTestError, Flown, fly};
 use greylag::sim::instruments::{Group, Instruments};
 use greylag::sim::missing::Craft;
-use greylag::sim::missing::{KINDS, Missing};
+use greylag::sim::missing::{KINDS, Missing, SERVOS};
 use greylag::sim::trial::Trial;
 use greylag_sitl::plant::{PlantOptions, Truth};
 
@@ -183,7 +183,7 @@ fn training_flights_excite_everything_and_test_flights_differ() {
 #[test]
 fn the_aircraft_stays_flyable_with_every_effect_hidden() {
     let lqi = lqi();
-    for kind in KINDS {
+    for kind in KINDS.into_iter().chain(SERVOS) {
         // the largest clear amplitude of each
         let largest =
             if kind.clear[0].abs() > kind.clear[1].abs() { kind.clear[0] } else { kind.clear[1] };

@@ -72,7 +72,7 @@ fn every_id_of_the_catalogue_is_there() {
                aeroelastic_loss actuator_lag time_delay dead_zone backlash rate_limit air_density \
                mass_error inertia_xz asymmetry dihedral_alpha roll_control_alpha \
                effectiveness_saturation ground_effect steady_wind alpha_bias beta_bias airspeed_scale \
-               imu_bias clock_skew external_load"
+               imu_bias clock_skew external_load servo_aileron servo_elevator"
         .split_whitespace()
     {
         assert!(ids.contains(&id), "{id}");
@@ -307,6 +307,51 @@ fn rate_limit_is_a_ramp() {
     for (k, y) in out.iter().enumerate().skip(4) {
         let exact = (0.02 * (k as f64 - 4.0)).min(0.3);
         assert!((y - exact).abs() < 1e-14, "{k}: {y} for {exact}");
+    }
+}
+
+/// The gain is 1 + k on the positive and 1 − k on the negative side; a servo remembers nothing.
+#[test]
+fn servos_gain_depends_on_the_side_alone() {
+    for kind in [inputs::Kind::ServoElevator, inputs::Kind::ServoAileron] {
+        let input = [-0.3, 0.2, 0.0, -0.1, 0.3];
+        let out = response(kind, 0.2, &input);
+        for (y, exact) in out.iter().zip([-0.24, 0.24, 0.0, -0.08, 0.36]) {
+            assert!((y - exact).abs() < 1e-15, "{y} for {exact}");
+        }
+        assert_eq!(response(kind, 0.0, &input), input, "k = 0 changes nothing");
+        let backwards: Vec<f64> = input.iter().rev().copied().collect();
+        let mut turned = response(kind, 0.2, &backwards);
+        turned.reverse();
+        assert_eq!(turned, out, "the order of the inputs does not matter");
+        // linear in k, with the slope |δ|
+        let more = response(kind, 0.3, &input);
+        for ((a, b), u) in out.iter().zip(&more).zip(input) {
+            assert!(((b - a) / 0.1 - u.abs()).abs() < 1e-12);
+        }
+        let about = kind.describe();
+        assert_eq!((about.shape, about.entry.unwrap().starts.len()), (0, 0), "{}", about.id);
+    }
+}
+
+/// Each servo changes its own surface, all SIMD lanes by their own sign.
+#[test]
+fn a_servo_changes_its_own_surface() {
+    let acting = |id: &str| {
+        let mut model = model("prior");
+        model.join(id, &[0.25]).unwrap();
+        model.act(&CONTROLS, &mut inputs::InputMemory::at_rest(&CONTROLS, [0.0; 2]))
+    };
+    let aileron = acting("servo_aileron");
+    assert_eq!(aileron, Controls { aileron: 1.25 * CONTROLS.aileron, ..CONTROLS });
+    let elevator = acting("servo_elevator");
+    assert_eq!(elevator, Controls { elevator: 0.75 * CONTROLS.elevator, ..CONTROLS });
+    let lanes = Lanes::<16>(std::array::from_fn(|k| if k % 2 == 0 { 0.1 } else { -0.1 }));
+    let mut past = Past::at_rest(lanes);
+    let out = inputs::Kind::ServoElevator.act(0.5, &mut past, lanes);
+    for (k, y) in out.0.into_iter().enumerate() {
+        let exact: f32 = if k % 2 == 0 { 0.15 } else { -0.05 };
+        assert!((y - exact).abs() < 1e-6, "lane {k}: {y}");
     }
 }
 

@@ -157,7 +157,7 @@ pub fn rate_on_turning_earth(model: &GreyBox, truth: &Truth, acting: &Controls) 
 
 /// Amplitudes several times what two minutes of flight show, so that an error of the formula cannot
 /// hide in the tolerance.
-pub const AMPLITUDES: [(&str, f64); 25] = [
+pub const AMPLITUDES: [(&str, f64); 27] = [
     ("drag_alpha2", 1.5),
     ("drag_beta2", 0.7),
     ("drag_elevator_abs", 0.3),
@@ -177,6 +177,8 @@ pub const AMPLITUDES: [(&str, f64); 25] = [
     ("dead_zone", 0.02),
     ("backlash", 0.02),
     ("rate_limit", 0.5),
+    ("servo_aileron", -0.2),
+    ("servo_elevator", 0.3),
     ("mass_error", 0.25),
     ("inertia_xz", 0.3),
     ("asymmetry", 0.004),

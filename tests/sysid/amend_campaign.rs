@@ -45,6 +45,8 @@ const CASES: &[Case] = &[
     ("dead_zone", 0.02, &[0.01], &[0.02]),
     ("backlash", 0.02, &[0.01], &[0.02]),
     ("rate_limit", 1.0, &[1.0], &[1.0]),
+    ("servo_elevator", 0.2, &[0.0], &[0.2]),
+    ("servo_aileron", -0.2, &[0.0], &[-0.2]),
     ("lift_stall", f64::NAN, &[1.0, 0.2, 50.0], &[f64::NAN, f64::NAN]),
 ];
 

@@ -117,6 +117,13 @@ fn an_effect_on_the_deflections_is_named() {
     found("dead_zone", 0.025, 0.1, 3);
 }
 
+/// One number explains lift, drag and pitching moment, or side force, rolling and yawing moment.
+#[test]
+fn a_servo_with_another_gain_on_each_side_is_named() {
+    found("servo_elevator", 0.2, 0.1, 11);
+    found("servo_aileron", -0.2, 0.1, 12);
+}
+
 #[test]
 fn a_rudder_that_moves_is_said_first_and_nothing_is_asserted_where_it_acts() {
     // doublets of ± 4.1° and 2 s: their sd is their amplitude

@@ -250,6 +250,8 @@ def act(kind, amount, past, now, before, h):
         return min(max(before, u - 0.5 * amount), u + 0.5 * amount)
     if kind == 5:  # limited rate
         return before + min(max(u - before, -amount * h), amount * h)
+    if kind == 7 or kind == 8:  # a gain of 1 + amount on the positive side, of 1 - amount on the other
+        return u + amount * abs(u)
     return u
 
 
@@ -298,8 +300,9 @@ def integrate(x, wanted, e, kind, amount, matrix, truth, commands):
                 acted = (acting_a, acting_e, old)
                 now += 1
                 past_a[now % HISTORY], past_e[now % HISTORY] = clipped(surface_a[0]), clipped(surface_e[0])
-                acting_a = act(kind, amount, past_a, now, acting_a, h)
-                acting_e = act(kind, amount, past_e, now, acting_e, h)
+                # a wrong servo is that of one surface
+                acting_a = act(0 if kind == 8 else kind, amount, past_a, now, acting_a, h)
+                acting_e = act(0 if kind == 7 else kind, amount, past_e, now, acting_e, h)
                 if lags:  # as the lag of the thrust
                     target = (acting_a, acting_e, throttle)[lagged_of]
                     slope = (target - acted[lagged_of]) / h

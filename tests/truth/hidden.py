@@ -32,6 +32,8 @@ AMPLITUDES = {
     "roll_control_alpha": (0.3, 0.5, True),
     "effectiveness_saturation": (-2.0, -1.0, False),
     "thrust_lag": (0.2, 0.6, False),
+    "servo_aileron": (0.1, 0.2, True),
+    "servo_elevator": (0.1, 0.2, True),
 }
 """Smallest and largest amplitude, and whether it may as well be negative.
 
@@ -65,6 +67,8 @@ PARAMETERS = {
     "roll_control_alpha": {"Clalphada": 1.0, "Cnalphada": 0.0},
     "effectiveness_saturation": {"k_perrad2": 1.0},
     "thrust_lag": {"tau_s": 1.0},
+    "servo_aileron": {"k": 1.0},
+    "servo_elevator": {"k": 1.0},
 }
 """The parameters in which the catalogue has a hidden effect, each as a multiple of the amplitude.
 
@@ -72,8 +76,10 @@ PARAMETERS = {
 wrong themselves. Of `lift_stall` only `alpha0_rad` is compared, and of `official` its table has no such formula.
 """
 
-INPUTS = ("actuator_lag", "time_delay", "dead_zone", "backlash", "rate_limit", "thrust_lag")
-"""Effects on what the surfaces, or of the last one the engine, do with their measured position."""
+INPUTS = (
+    "actuator_lag", "time_delay", "dead_zone", "backlash", "rate_limit", "thrust_lag", "servo_aileron", "servo_elevator",
+)  # fmt: skip
+"""Effects on what the surfaces, or of `thrust_lag` the engine, do with their measured position."""
 
 TAKEN_OUT = {"drag_beta2": "drag_beta2", "drag_elevator_abs": "drag_elevator_abs", "lift_stall": "lift_table"}
 """What a model loses so that it lacks the effect, where the aircraft has it of its own."""

@@ -12,8 +12,11 @@ NAMED = {
     "tilt": "axes_askew", "gyro_gain": "imu_gain", "force_gain": "imu_gain", "vane_gain": "vane_gain",
     "airspeed_lag": "clock_skew", "velocity_late": "clock_skew",
 }  # fmt: skip
-"""What `greylag diagnose` calls each error. The others have no name of their own in its list."""
-KINDS = (*NAMED, "frozen", "servo", "gusts")
+"""What `greylag diagnose` calls each error of a sensor."""
+SERVO = ("servo_aileron", "servo_elevator")
+"""What it calls an aileron or an elevator that turns further than recorded on one side: an effect on the inputs."""
+KINDS = (*NAMED, "frozen", "servo", "gusts", "servo_sides")
+"""All errors. Those without a name have none in the program's list."""
 LATE = 0.02
 """Delays above this (s) are more than the skew that every log has."""
 GUST_TIME = 1.5
@@ -33,12 +36,18 @@ def drawn(kinds, random):
         "frozen": random.uniform(0.1, 0.3),
         "servo": random.uniform(0.1, 0.3),
         "gusts": random.uniform(0.3, 1.0),
+        "servo_sides": random.uniform(0.1, 0.2),
     }
     return {kind: {"size": float(sign * size[kind]) if kind in SIGNED else float(size[kind]), "axis": axis} for kind in kinds}
 
 
-SIGNED = ("tilt", "gyro_gain", "force_gain", "vane_gain", "servo")
+SIGNED = ("tilt", "gyro_gain", "force_gain", "vane_gain", "servo", "servo_sides")
 """Errors of either sign."""
+
+
+def name_of(kind, error):
+    """What `greylag diagnose` calls an error; None if it has no name."""
+    return SERVO[error["axis"] % 2] if kind == "servo_sides" else NAMED.get(kind)
 
 
 def gusty(wind, gust, steps, period, random):
@@ -121,4 +130,7 @@ def seen(truth, step, errors):
         elif kind == "servo":  # gain, and a curve of the recorded deflection
             column = of["actuators"].start + axis % 2
             out[:, column] *= 1.0 + 0.3 * size + size * np.abs(out[:, column])
+        elif kind == "servo_sides":  # it turns by 1 + size times what is recorded on the positive side, by 1 - size on the other
+            column = of["actuators"].start + axis % 2
+            out[:, column] /= 1.0 + size * np.sign(out[:, column])
     return out

@@ -3,9 +3,12 @@
     python tests/truth/make_cases.py --truth continuous --seed 1 --effects all --nulls 20 --out cases
     python tests/truth/make_cases.py --truth continuous --seed 1 --formulas 24 --nulls 20 --out cases
     python tests/truth/make_cases.py --truth official --seed 1 --effects all --nulls 20 --installed 1 --out cases
+    python tests/truth/make_cases.py --truth official --seed 1 --both 100 --installed 1 --out cases
+    python tests/truth/make_cases.py --truth official --seed 1 --effects '' --nulls 100 --installed 1 --errors servo_sides --out cases
 
 The second command hides formulas of `formulas.py` in place of effects, for `greylag propose`. The third draws an error of
-installation or calibration (`installed.py`) for each case. Every case is a folder
+installation or calibration (`installed.py`) for each case. The fourth draws an effect and an error for each of 100 cases.
+The fifth hides nothing, and all cases have the named error. Every case is a folder
 with model.toml, airframe.toml, train-1..3.csv, test-1..2.csv and truth.json. All of it follows from the seed.
 """
 
@@ -90,14 +93,17 @@ def flown_with_formula(fly, draw, case, seed, duration, strength):
     raise Lost(f"{case}: none of {DRAWS} formulas can be flown")
 
 
-def make_case(folder, kind, case, seed, effect, options, duration, wrong, strength=1.0, errors_at_once=0):
-    """Writes one case; `effect` is an id, one of `DRAWN` for a formula that is drawn, or None."""
+def make_case(folder, kind, case, seed, effect, options, duration, wrong, strength=1.0, errors=((), 0)):
+    """Writes one case; `effect` is an id, one of `DRAWN` for a formula that is drawn, or None.
+
+    `errors`: kinds of errors of installation, and how many of them are drawn.
+    """
     (fly, step), folder = truth_of(kind), folder / case
     folder.mkdir(parents=True)
     record = {"case": case, "truth": kind, "seed": seed, "hidden": effect, "amount": 0.0, "duration_s": duration}
     record.update(sensors=asdict(options), wrong=wrong, flights={})
     erring = hidden.random_of(seed, case, 8)
-    kinds = erring.choice(installed.KINDS, min(errors_at_once, len(installed.KINDS)), replace=False)
+    kinds = erring.choice(errors[0], min(errors[1], len(errors[0])), replace=False) if errors[1] else ()
     wrongly = installed.drawn([str(k) for k in kinds], erring)
     gust = wrongly.get("gusts", {}).get("size", 0.0)
     if wrongly:
@@ -133,6 +139,24 @@ def chosen(text):
     return ids
 
 
+def kinds_of_errors(text, truth):
+    """The errors of `--errors` that a truth can have, in the order of `installed.KINDS`."""
+    asked = [x for x in text.split(",") if x] or installed.KINDS
+    unknown = [x for x in asked if x not in installed.KINDS]
+    if unknown:
+        sys.exit(f"--errors: no error {', '.join(unknown)}; there are {', '.join(installed.KINDS)}")
+    kinds = [k for k in installed.KINDS if k in asked and (k != "gusts" or truth != "continuous")]
+    return kinds or sys.exit("--errors: only the official truths fly through gusts")
+
+
+def beside_errors(count, truth, seed, effects):
+    """`count` cases, each with an effect drawn from `effects`."""
+    if count and not effects:
+        sys.exit("--both: name effects from which one is drawn for each case")
+    cases = [f"{truth}-both-{k:02}" for k in range(count)]
+    return [(case, str(hidden.random_of(seed, case, 10).choice(effects))) for case in cases]
+
+
 def pairs(text):
     """`group=rate,...` as a table."""
     return {k: float(v) for k, v in (pair.split("=") for pair in text.split(",") if pair)}
@@ -157,6 +181,8 @@ def arguments():
     p.add_argument("--missing", default="", help="sensor groups that are not logged: vanes,actuators")
     p.add_argument("--drift", type=float, default=0.0, help="drift of the gyros' biases, rad/s²; warm: 1.5e-5")
     p.add_argument("--installed", type=int, default=0, help="errors of installation drawn for each case")
+    p.add_argument("--errors", default="", help="errors from which they are drawn, with commas between; all without")
+    p.add_argument("--both", type=int, default=0, help="cases with one drawn effect of --effects and errors of --installed at once")
     p.add_argument("--duration", type=float, default=manoeuvres.FLIGHT, help="length of each flight, s")
     p.add_argument("--out", type=Path, required=True, help="folder of the cases; each must be new")
     return p.parse_args()
@@ -172,15 +198,18 @@ def main():
         sys.exit(f"no sensor group {', '.join(unknown)}; there are {', '.join(sensors.GROUPS)}")
     if (a.formulas or a.lagged) and a.truth != "continuous":
         sys.exit("--formulas, --lagged: only the continuous truth can hide formulas")
-    if a.installed and (a.truth == "continuous" or a.formulas or a.lagged):
-        sys.exit("--installed: only the official truths fly through gusts, and they hide no formulas")
+    if a.installed and (a.formulas or a.lagged):
+        sys.exit("--installed: not beside formulas")
+    if a.both and not a.installed:
+        sys.exit("--both: say with --installed how many errors each case has")
+    errors = (kinds_of_errors(a.errors, a.truth), a.installed)
     effects = a.effects if a.effects is not None else "" if a.formulas or a.lagged else "all"
     cases = [(f"{a.truth}-null-{k:02}", None) for k in range(a.nulls)]
-    cases += [(f"{a.truth}-{effect}", effect) for effect in chosen(effects)]
+    cases += beside_errors(a.both, a.truth, a.seed, chosen(effects)) if a.both else [(f"{a.truth}-{e}", e) for e in chosen(effects)]
     cases += [(f"{a.truth}-formula-{k:02}", FORMULA) for k in range(a.formulas)]
     cases += [(f"{a.truth}-lagged-{k:02}", LAGGED) for k in range(a.lagged)]
     for case, effect in cases:
-        make_case(a.out, a.truth, case, a.seed, effect, options, a.duration, a.wrong, a.strength, a.installed)
+        make_case(a.out, a.truth, case, a.seed, effect, options, a.duration, a.wrong, a.strength, errors)
         print(a.out / case, flush=True)
 
 

@@ -164,6 +164,22 @@ def delay(d, a):
     d.pass_through("actuator", [("delay", {"type": "frames"}, round(a / STEP) + 1)])
 
 
+def servo(surface):
+    """A surface whose gain is 1 + a on the positive side and 1 - a on the other."""
+
+    def write(d, a):
+        channel = ET.SubElement(d.root.find("flight_control"), "channel", name="truth")
+        element = ET.SubElement(channel, "aerosurface_scale", name=f"truth/{surface}")
+        ET.SubElement(element, "input").text = POSITIONS[surface]
+        for tag, ends in (("domain", (-1.0, 1.0)), ("range", (a - 1.0, a + 1.0))):
+            part = ET.SubElement(element, tag)
+            for name, end in zip(("min", "max"), ends):
+                ET.SubElement(part, name).text = repr(end)
+        d.read_instead(surface, f"truth/{surface}")
+
+    return write
+
+
 def along_alpha(*others):
     """A rolling moment by alpha times other properties."""
     return lambda d, a: d.add("ROLL", "roll", product(*QS, "metrics/bw-ft", a, "aero/alpha-rad", *others))
@@ -192,6 +208,8 @@ WRITE = {
     "dead_zone": lambda d, a: d.pass_through("deadband", [("width", {}, 2.0 * a)]),
     "backlash": lambda d, a: d.pass_through("actuator", [("hysteresis_width", {}, a)]),
     "rate_limit": lambda d, a: d.pass_through("actuator", [("rate_limit", {}, a)]),
+    "servo_aileron": servo("aileron"),
+    "servo_elevator": servo("elevator"),
     "mass_error": lambda d, a: d.set("mass_balance/emptywt", lambda m: m * (1.0 + a)),
     # JSBSim's ixz is -Jxz
     "inertia_xz": lambda d, a: d.set("mass_balance/ixz", lambda i: i - a / TORQUE),

@@ -70,9 +70,31 @@ def line(r):
     return f"{r['case']:42} {r['hidden'] or 'none':24} first {first:24} asserted {','.join(r['asserted']) or '-':36} {r['verdict']:12} {evidence}"
 
 
+def erring(r):
+    """What greylag calls the errors of installation of a case, those without a name left out."""
+    names = (installed.name_of(kind, error) for kind, error in (r.get("installed") or {}).items())
+    return {name for name in names if name}
+
+
 def wrong(r):
-    """Ids asserted that the aircraft does not lack."""
-    return [x for x in r["asserted"] if x != r["hidden"]]
+    """Ids asserted that the aircraft does not lack and that are no error of its servos."""
+    return [x for x in r["asserted"] if x != r["hidden"] and x not in erring(r)]
+
+
+def told(r):
+    """Whether every error of installation that has a name is named."""
+    return erring(r) <= {*r["errors"], *r["asserted"]}
+
+
+def ranked_first(r):
+    """Whether the hidden effect is the best of what is ranked, but for errors of its servos."""
+    others = [x for x in r["ranked"] if x == r["hidden"] or x not in erring(r)]
+    return others[:1] == [r["hidden"]]
+
+
+def both_named(r):
+    """Whether the hidden effect is asserted and every error beside it named."""
+    return told(r) and r["hidden"] in r["asserted"]
 
 
 def table(records):
@@ -114,29 +136,40 @@ def wrongly_installed(records):
         "|---|---|---|---|---|---|---|---|",
     ]
     own = [r for r in records if r.get("installed")]
-    named = lambda r: {installed.NAMED[k] for k in r["installed"] if k in installed.NAMED} <= set(r["errors"])  # noqa: E731
     for kind, count in sorted({(r["truth"], len(r["installed"])) for r in own}):
         some = [r for r in own if (r["truth"], len(r["installed"])) == (kind, count)]
         nulls, effects = [r for r in some if not r["hidden"]], [r for r in some if r["hidden"]]
-        nameable = [r for r in some if set(r["installed"]) & set(installed.NAMED)]
+        nameable = [r for r in some if erring(r)]
         both = [r for r in nameable if r["hidden"]]
         cells = (
-            of([r for r in nulls if r["asserted"]], nulls),
-            of([r for r in nulls if r["verdict"] in ("effect", "unexplained")], nulls),
-            of([r for r in nameable if named(r)], nameable),
-            of([r for r in both if named(r) and r["hidden"] in r["asserted"]], both),
-            of([r for r in effects if r["ranked"][:1] == [r["hidden"]]], effects),
+            of([r for r in nulls if wrong(r)], nulls),
+            of([r for r in nulls if wrong(r) or r["verdict"] == "unexplained"], nulls),
+            of([r for r in nameable if told(r)], nameable),
+            of([r for r in both if both_named(r)], both),
+            of([r for r in effects if ranked_first(r)], effects),
             of([r for r in effects if wrong(r)], effects),
         )
         rows.append(f"| {kind} | {count} | " + " | ".join(cells) + " |")
-    rows += ["", "| error | cases | named | an effect asserted wrongly | verdicts without an effect |", "|---|---|---|---|---|"]
+    return "\n".join([*rows, "", *by_error(own)]) if own else ""
+
+
+def by_error(own):
+    """What is said of cases with one error of installation, a row an error."""
+    rows = ["| error | cases | named | an effect asserted wrongly | verdicts without an effect | effect beside it ranked first | both named |", "|---|---|---|---|---|---|---|"]
     for kind in installed.KINDS:
         some = [r for r in own if list(r["installed"]) == [kind]]
         verdicts = [r["verdict"] for r in some if not r["hidden"]]
         counts = ", ".join(f"{v} {verdicts.count(v)}" for v in sorted(set(verdicts)))
-        told = sum(named(r) for r in some) if kind in installed.NAMED else "no name"
-        rows.append(f"| {kind} | {len(some)} | {told} | {sum(bool(wrong(r)) for r in some)} | {counts or '-'} |")
-    return "\n".join(rows) if own else ""
+        effects, has_name = [r for r in some if r["hidden"]], any(erring(r) for r in some)
+        cells = (
+            str(sum(told(r) for r in some)) if has_name else "no name" if some else "-",
+            str(sum(bool(wrong(r)) for r in some)),
+            counts or "-",
+            f"{sum(ranked_first(r) for r in effects)} of {len(effects)}",
+            f"{sum(both_named(r) for r in effects)} of {len(effects)}" if has_name else "-",
+        )
+        rows.append(f"| {kind} | {len(some)} | " + " | ".join(cells) + " |")
+    return rows
 
 
 def tables(records):

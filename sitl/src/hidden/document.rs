@@ -153,7 +153,12 @@ impl<'a> Document<'a> {
 
     /// Passes the deflections of aileron and elevator through a further flight-control component before they act.
     pub(super) fn pass_deflections(&mut self, component: &str, settings: &str) {
-        for surface in SURFACES {
+        self.pass_each([(component, settings); 2]);
+    }
+
+    /// The same with components of their own, each with its settings, for aileron and elevator in this order.
+    pub(super) fn pass_each(&mut self, components: [(&str, &str); 2]) {
+        for (surface, (component, settings)) in SURFACES.into_iter().zip(components) {
             let (input, name) = (
                 self.passed_name(surface, self.passed),
                 self.passed_name(surface, self.passed + 1),

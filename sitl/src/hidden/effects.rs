@@ -19,7 +19,7 @@ const ANY: f64 = 1e3;
 const LARGE: f64 = 1e7;
 
 /// The catalogue of hidden effects.
-pub static EFFECTS: [Effect; 25] = [
+pub static EFFECTS: [Effect; 27] = [
     Effect {
         id: "drag_alpha2",
         formula: "drag Q a α², in addition to the drag table",
@@ -209,6 +209,26 @@ pub static EFFECTS: [Effect; 25] = [
         },
     },
     Effect {
+        id: "servo_aileron",
+        formula: "the aileron acts as δa (1 + a) where positive, as δa (1 − a) where negative",
+        unit: "",
+        bounds: (-0.9, 0.9),
+        write: |d, a| {
+            d.pass_each([("aerosurface_scale", sides(a).as_str()), UNCHANGED]);
+            Ok(())
+        },
+    },
+    Effect {
+        id: "servo_elevator",
+        formula: "the elevator acts as δe (1 + a) where positive, as δe (1 − a) where negative",
+        unit: "",
+        bounds: (-0.9, 0.9),
+        write: |d, a| {
+            d.pass_each([UNCHANGED, ("aerosurface_scale", sides(a).as_str())]);
+            Ok(())
+        },
+    },
+    Effect {
         id: "mass_error",
         formula: "empty mass × (1 + a), inertias as they are",
         unit: "",
@@ -266,6 +286,15 @@ pub static EFFECTS: [Effect; 25] = [
         },
     },
 ];
+
+/// A flight-control component, with its settings, that leaves a deflection unchanged.
+const UNCHANGED: (&str, &str) = ("pure_gain", "<gain>1</gain>");
+
+/// Settings of a component that has the gain 1 + a for positive and 1 − a for negative inputs.
+fn sides(a: f64) -> String {
+    let ends = |min: f64, max: f64| format!("<min>{min}</min><max>{max}</max>");
+    format!("<domain>{}</domain><range>{}</range>", ends(-1.0, 1.0), ends(a - 1.0, 1.0 + a))
+}
 
 fn alpha() -> String {
     property("aero/alpha-rad")

@@ -188,6 +188,11 @@ fn effects_on_the_surfaces_act_in_every_channel_the_surfaces_act_in() {
         let all = acting_as(t, q, |x| x * (1.0 - 2.0 * x * x));
         Loads { l: all.l, m: all.m, ..Loads::NONE }
     });
+    acts("servo_aileron=0.3", 1, |_, t, q| of_deflections(q, 0.3 * t.aileron_rad.abs(), 0.0, 0.0));
+    acts("servo_elevator=0.3", 1, |_, t, q| {
+        let (before, after) = (t.elevator_rad, t.elevator_rad + 0.3 * t.elevator_rad.abs());
+        of_deflections(q, 0.0, after - before, after.abs() - before.abs())
+    });
     acts("roll_control_alpha=-0.6", 1, |_, t, q| Loads {
         l: q * S * B * -0.6 * t.alpha_rad * t.aileron_rad,
         ..Loads::NONE

@@ -61,6 +61,24 @@ fn the_thrust_lag_follows_its_recurrence() {
     assert!(most > 1.0, "the lag was not met: {most} lbf");
 }
 
+#[test]
+fn a_servos_gain_depends_on_the_side() {
+    for (effect, k) in [("servo_elevator=0.3", 0.3), ("servo_elevator=-0.2", -0.2)] {
+        let mut hidden = plant_with(&[effect]);
+        let mut sides = [false; 2];
+        for step in 0..200 {
+            let elevator = if (step / 40) % 2 == 0 { 0.5 } else { -0.5 };
+            let truth = hidden.step(Inputs { elevator, aileron: elevator, ..IDLE }).unwrap();
+            let (e, a) = (truth.elevator_rad, truth.aileron_rad);
+            let acts = hidden.property("hidden/elevator-1").unwrap();
+            assert!((acts - (e + k * e.abs())).abs() < 1e-12, "{effect}, step {step}: {acts}");
+            assert_eq!(hidden.property("hidden/aileron-1").unwrap(), a, "{effect}, step {step}");
+            sides[usize::from(e > 0.0)] |= e.abs() > 0.05;
+        }
+        assert_eq!(sides, [true; 2], "the elevator moves to both sides");
+    }
+}
+
 /// An amplitude within the bounds at which a flight of 3 s stays finite.
 fn mild(id: &str) -> f64 {
     match id {
@@ -69,6 +87,7 @@ fn mild(id: &str) -> f64 {
         "asymmetry" => 0.003,
         "propeller_gyro" => 0.05,
         "rate_limit" => 0.3,
+        "servo_aileron" | "servo_elevator" => 0.2,
         "aeroelastic_loss" | "mass_error" | "inertia_xz" | "propwash" => 0.1,
         "thrust_scale" => -3.0,
         _ => 0.5,

@@ -1,14 +1,15 @@
 //! Input effects, such as a lag or backlash: they act between the actuators' measured positions and the acting deflections.
 //! Each has its own file.
 //!
-//! Input effects have memory and are nonlinear in their constant. Several effects of one model act one after the other in
-//! the order of the list at the end of this file. A new effect needs a file in this folder and its name in that list.
+//! Most input effects have memory and are nonlinear in their constant. The curves of servos have no memory, and the acting
+//! deflection is linear in their constant. Several effects of one model act one after the other in the order of the list at the
+//! end of this file. A new effect needs a file in this folder and its name in that list.
 //!
 //! Input effects apply wherever a model is stepped: open-loop simulations, simulated flights and the planner. The planner
 //! does not observe the acting deflections and assumes surfaces and throttle at rest before its plan. Trim neglects input
-//! effects; in steady flight only the dead zone would matter. The linear model, and thus the design of the LQI, neglects
-//! all of them. The LQI's integrators compensate constant errors caused by this. `tests/model/effects_lqi.rs` measures how
-//! much a lag or delay degrades the LQI.
+//! effects; in steady flight only the dead zone and the curve of a servo would matter. The linear model, and thus the design of
+//! the LQI, neglects all of them. The LQI's integrators compensate constant errors caused by this.
+//! `tests/model/effects_lqi.rs` measures how much a lag or delay degrades the LQI.
 
 use crate::Controls;
 use crate::actuators::LAGS;
@@ -29,6 +30,10 @@ pub const MOST: usize = 3;
 pub enum Acts {
     /// Aileron and elevator, rad.
     OnSurfaces,
+    /// The aileron, rad.
+    OnAileron,
+    /// The elevator, rad.
+    OnElevator,
     /// The throttle, 0 to 1.
     OnThrottle,
 }
@@ -43,9 +48,9 @@ pub trait InputEffect {
     const FORMULA: &'static str;
     /// Source of the formula.
     const SOURCE: &'static str;
-    /// The effect's single constant.
+    /// The effect's single constant. It is a shape constant, unless the acting value is linear in it.
     const COEFFICIENTS: &'static [Coefficient; 1];
-    /// Entry in the catalogue of effects.
+    /// Entry in the catalogue of effects. Its starting values are empty if the acting value is linear in the constant.
     const ENTRY: Entry;
     /// Controls on which the effect acts.
     const ACTS: Acts = Acts::OnSurfaces;
@@ -127,6 +132,10 @@ impl<R: Real> InputMemory<R> {
                 elevator: kind.act(constant, elevator, z.elevator),
                 ..*z
             },
+            Acts::OnAileron => Controls { aileron: kind.act(constant, aileron, z.aileron), ..*z },
+            Acts::OnElevator => {
+                Controls { elevator: kind.act(constant, elevator, z.elevator), ..*z }
+            }
             Acts::OnThrottle => {
                 Controls { throttle: kind.act(constant, throttle, z.throttle), ..*z }
             }
@@ -157,7 +166,8 @@ macro_rules! inputs {
                     formula: $type::FORMULA,
                     source: $type::SOURCE,
                     coefficients: $type::COEFFICIENTS,
-                    shape: 1,
+                    // an effect without starting values is linear in its constant
+                    shape: if $type::ENTRY.starts.is_empty() { 0 } else { 1 },
                     table: None,
                     grid: None,
                     replaces: &[],
@@ -193,4 +203,6 @@ inputs! {
     backlash::Backlash,
     rate_limit::RateLimit,
     thrust_lag::ThrustLag,
+    servo_aileron::ServoAileron,
+    servo_elevator::ServoElevator,
 }

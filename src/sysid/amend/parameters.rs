@@ -78,6 +78,8 @@ pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
         .filter_map(|(index, (c, linear))| {
             let (id, short) = c.name.split_once('.')?;
             let (about, input) = describe(id)?;
+            // the curve of a servo: deflections are linear in its constant
+            let linear = linear || (input && about.shape == 0);
             let coefficient = about.coefficients.iter().find(|k| k.name == short)?;
             let added = added.contains(&id);
             let (low, high) = model.bounds(index, coefficient);

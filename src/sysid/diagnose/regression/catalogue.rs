@@ -30,7 +30,8 @@ const SMALLER: f64 = 2.5;
 pub struct Entry {
     /// Description of the effect.
     pub about: Description,
-    /// Whether the effect changes the deflections (input effect), as an actuator lag does.
+    /// Whether the effect changes the deflections (input effect), as an actuator lag does. The curve of a servo is linear in its
+    /// constant, and its column is computed like those of other linear candidates.
     pub operator: bool,
 }
 
@@ -136,8 +137,9 @@ pub fn straight(entry: &Entry) -> bool {
     starts(entry).is_empty()
 }
 
-/// Adds all of `entries` to a copy of `model`, except those that cannot be added. Returns this model, and the added entries with
-/// the values of their coefficients: zero, or the bound nearest to zero.
+/// Adds all of `entries` to a copy of `model`, except those that cannot be added, for example because the model would have too
+/// many input effects. Returns this model, and the added entries with the values of their coefficients: zero, or the bound
+/// nearest to zero.
 pub fn with_all(model: &GreyBox, entries: &[Entry]) -> (GreyBox, Vec<(Entry, Vec<f64>)>) {
     let mut everything = model.clone();
     let mut joined = Vec::new();

@@ -13,6 +13,7 @@ use crate::weak_form::prepared::Prepared;
 use crate::weak_form::windows::{gyroscopic, inertia, to_force_axes};
 use greylag_logs::Sampling;
 use greylag_model::GreyBox;
+use greylag_physics::inputs as input_effects;
 use greylag_physics::rigid_body::{self, RigidBody, Vector};
 use greylag_physics::{Channel, Wrench};
 
@@ -127,8 +128,8 @@ impl Ready {
     }
 
     /// Regressors of the coefficients with the indices `wanted` in `model`: predicted forces and moments for one unit of each
-    /// coefficient. `model` must have at least the effects of the model of this flight. The columns of nonlinear coefficients and
-    /// of coefficients of input effects are empty.
+    /// coefficient. `model` must have at least the effects of the model of this flight. The columns of nonlinear coefficients are
+    /// empty, also those of input effects.
     pub fn linear(&self, model: &GreyBox, wanted: Range<usize>) -> Vec<Column> {
         // a formula with a lag needs lagged deflections, which the model of this flight may not have computed
         let remembered = (model.lags() > 0).then(|| self.measured.acting(model));
@@ -163,6 +164,9 @@ impl Ready {
                 let of_body = self.body(model, &body, step);
                 columns[column].iter_mut().zip(of_body).for_each(|(a, b)| join(a, b));
             }
+            if let Some(of_servo) = self.servo(model, index) {
+                columns[column] = of_servo;
+            }
         }
         columns
     }
@@ -190,6 +194,27 @@ impl Ready {
             (0..3).for_each(|c| add(0, 3 + c, (old[c] - new[c]) / step));
         });
         columns.pop().unwrap_or_default()
+    }
+
+    /// Regressor of the coefficient with the index `index` of `model`, if it is the constant of an input effect that is linear
+    /// in it, as the curve of a servo is. Empty in the channels in which the effect does not act. `None` for other coefficients.
+    fn servo(&self, model: &GreyBox, index: usize) -> Option<Column> {
+        const MOVED: f64 = 0.1;
+        let named = &model.coefficients()[index];
+        let (id, _) = named.name.split_once('.')?;
+        if input_effects::Kind::from_id(id)?.describe().shape > 0 {
+            return None;
+        }
+        let at = |value: f64| {
+            let mut moved = model.clone();
+            moved.set_coefficient(&named.name, value);
+            self.operator(&moved)
+        };
+        let (up, down) = (at(named.value + MOVED), at(named.value - MOVED));
+        let mut column = combine(&[up, down], &[0.5 / MOVED, -0.5 / MOVED]);
+        let silent = |x: &f64| *x == 0.0 || x.is_nan();
+        column.iter_mut().filter(|c| c.iter().all(silent)).for_each(Vec::clear);
+        Some(column)
     }
 
     /// Contribution of an input effect that `model` has in addition to the model of this flight: the difference of the

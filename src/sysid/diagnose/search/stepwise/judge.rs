@@ -59,7 +59,7 @@ impl Found {
             }
             let bends = shape.bends_beside(effect.score.fall);
             let on_surfaces =
-                Kind::from_id(effect.id).is_some_and(|k| k.acts() == Acts::OnSurfaces);
+                Kind::from_id(effect.id).is_some_and(|k| k.acts() != Acts::OnThrottle);
             if on_surfaces && bends > BENT {
                 effect.refused.push(format!(
                     "lack of fit: with it, second derivatives of the surfaces still explain {:.1} % of what is \
