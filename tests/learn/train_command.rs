@@ -137,8 +137,8 @@ fn a_linear_residual_is_written_where_it_helps() {
         ["model.toml", "train-1.csv", "train-2.csv", "test-1.csv"].map(|f| at(&format!("m/{f}")));
     let train = |model: &str, out: &str| {
         let logs = ["--log", &one, &two, "--hold-out", &test];
-        let line = [["train", "residual", "--model", model, "--out", out].as_slice(), &logs];
-        greylag(&line.concat())
+        let words = ["train", "residual", "--model", model, "--out", out];
+        greylag(&[&words[..], &logs].concat())
     };
     let done = train(&model, &at("r"));
     assert!(done.status.success(), "{}", said(&done));

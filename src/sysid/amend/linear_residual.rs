@@ -111,7 +111,14 @@ fn with_residual(
     let residual = Residual::new(network, &model.airframe, model.scale()).ok()?;
     let seen = (0..parts.len()).filter(used).flat_map(|k| parts[k].segments.iter().flatten());
     let residual = residual.trained_on(seen.map(|at| (&at.state, &at.controls)));
-    Some(GreyBox { residual: Some(residual), ..model.clone() })
+    Some(having(model, residual))
+}
+
+/// `model` with `residual`.
+fn having(model: &GreyBox, residual: Residual) -> GreyBox {
+    let mut with = model.clone();
+    with.residual = Some(residual);
+    with
 }
 
 /// Sums over steps from which the least-squares fit follows.
@@ -242,7 +249,7 @@ mod tests {
         weights[INPUTS * OUTPUTS + 3] = 0.004; // a constant roll acceleration
         let network = Dense::new(&[INPUTS, OUTPUTS], weights).unwrap();
         let planted = Residual::new(network, &model.airframe, model.scale()).unwrap();
-        let truth = GreyBox { residual: Some(planted), ..model.clone() };
+        let truth = having(&model, planted);
         let parts = [flown(&truth, "a", 0.0), flown(&truth, "b", 1.0)];
         let found = fit(&model, &parts, &[1.0, 2.0]).unwrap();
         assert_eq!(found.ridge, RIDGES[0], "without noise the smallest ridge is best");

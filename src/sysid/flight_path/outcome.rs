@@ -56,7 +56,7 @@ const DRAWS: usize = 3;
 /// [`ReconstructError::NoPath`] if the equations of the simulated path errors are singular.
 pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, ReconstructError> {
     let Problem { log, options, .. } = *problem;
-    let mut segments = path_as_segments(problem, found, &found.paths, None);
+    let segments = path_as_segments(problem, found, &found.paths, None);
     let mut nuisances = nuisances(problem, found);
     let mut notes = log.notes.clone();
     declare(problem, found, &nuisances, &mut notes);
