@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # FilterPy 2.0.0: in the linear case, in which every one of its estimators should be the Kalman filter or better, the cubature filter claims a standard deviation six times the true error, larger even than
 # the noise of the sensor it has just read, and the fixed-lag smoother is six times worse than the filter inside it. Kalman, unscented, extended and square-root filters agree to the last digits.
-# The cubature filter draws its points before the process noise is added and does not draw them again, so that gain and covariance lack that noise (the unscented filter of the package draws again).
+# The cubature filter draws its points before the process noise is added and does not draw them again, so that the innovation lacks that noise and the update removes too little of it (the unscented filter of the package draws again).
 # The smoother begins with the covariance after the update, where the one before it belongs. With little process noise, as in the example of the documentation, both look right.
 # Why it matters: with process noise for gusts, as in the reconstruction of a flight path, a cubature filter that is checked by its covariance seems badly tuned, and a log that was smoothed is worse than a raw one.
 # The documentation promises "a pretty good smoothed result", and advises the RTS smoother for batches only, as better and faster. Instead: the unscented filter, and rts_smoother().
