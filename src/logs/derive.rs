@@ -1,19 +1,23 @@
 //! Computes columns that a log lacks from other columns, if the user's mapping file requests it.
 //!
-//! A motion capture measures position and attitude. A velocity is the slope of a parabola that is fitted to the positions
-//! around a row. Body rates are found in the same way, as slopes of the rotations relative to the row's attitude. The
-//! airspeed is the magnitude of the velocity over ground minus a known wind. The mapping states the time span of the fits.
+//! A motion capture measures position and attitude. A velocity is the slope of a cubic polynomial that is fitted to the
+//! positions around a row (Savitzky and Golay, Analytical Chemistry 36, 1964). Body rates are found in the same way, as slopes of
+//! the rotations relative to the row's attitude. The airspeed is the magnitude of the velocity over ground minus a known wind.
+//! The mapping states the time span T of the fits. A motion of the angular frequency ω keeps all but the part (ωT)⁴/8064 of its
+//! rate; a parabola would lose (ωT)²/40.
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix4, UnitQuaternion, Vector3, Vector4};
 
 use super::Sample;
 use super::columns::{COLUMNS, index};
 use super::mapping::Mapping;
 use greylag_num::statistics::quantile;
 
-/// Smallest number of rows to which a parabola is fitted.
-const FEWEST: usize = 5;
-/// The measurement counts as a jump if the residual of a parabola exceeds the log's median residual by this factor.
+/// Smallest number of rows to which a cubic is fitted.
+const FEWEST: usize = 6;
+/// Time before and after a row that must have samples, as a fraction of the time span. The slope at the end of a span is noisy.
+const LEAST_SIDE: f64 = 0.2;
+/// The measurement counts as a jump if the residual of a cubic exceeds the log's median residual by this factor.
 const JUMPED: f64 = 8.0;
 /// Smallest residual, as a fraction of the largest value of the column (for rotations, in rad). Smaller residuals are
 /// rounding errors and are raised to it.
@@ -40,7 +44,7 @@ pub(super) fn apply(rows: &mut [Sample], mapping: &Mapping) -> Vec<String> {
     }
     if !slopes.is_empty() {
         let names: Vec<&str> = slopes.iter().map(|(column, _)| *column).collect();
-        notes.push(format!("rates of change, by a parabola around each row: {}", names.join(", ")));
+        notes.push(format!("rates of change, by a cubic around each row: {}", names.join(", ")));
     }
     if let Some(over_s) = mapping.body_rates_over_s() {
         let jumped = body_rates(rows, over_s);
@@ -81,7 +85,7 @@ fn fresh(samples: &[(f64, f64)]) -> Vec<(f64, f64)> {
     samples.iter().map(one).collect()
 }
 
-/// Slope of the parabola around each sample, and root mean square of its residuals. Both are NaN where a sample has no
+/// Slope of the cubic around each sample, and root mean square of its residuals. Both are NaN where a sample has no
 /// value.
 fn slopes_of(samples: &[(f64, f64)], over_s: f64) -> Vec<[f64; 2]> {
     let scale = samples.iter().map(|s| s.1.abs()).filter(|x| x.is_finite()).fold(0.0, f64::max);
@@ -95,7 +99,7 @@ fn slopes_of(samples: &[(f64, f64)], over_s: f64) -> Vec<[f64; 2]> {
                 return [f64::NAN; 2];
             }
             let points = window.iter().filter(|s| s.1.is_finite()).map(|s| (s.0 - t, s.1 - x));
-            parabola(&points.collect::<Vec<_>>(), over_s)
+            cubic(&points.collect::<Vec<_>>(), over_s)
                 .map_or([f64::NAN; 2], |[slope, misfit]| [slope, misfit.max(ROUNDING * scale)])
         },
     )
@@ -128,7 +132,7 @@ fn body_rates(rows: &mut [Sample], over_s: f64) -> usize {
             std::array::from_fn(|axis| {
                 let points: Vec<(f64, f64)> =
                     turns.iter().map(|(t, turn)| (*t, turn[axis])).collect();
-                parabola(&points, over_s)
+                cubic(&points, over_s)
                     .map_or([f64::NAN; 2], |[slope, misfit]| [slope, misfit.max(ROUNDING)])
             })
         },
@@ -172,15 +176,19 @@ fn around<T, R>(
     (0..samples.len()).map(one).collect()
 }
 
-/// The slope at time 0 of the parabola fitted to `points` (time, value), and the root mean square of the residuals.
-/// `None` if there are too few points, or none on one side.
-fn parabola(points: &[(f64, f64)], over_s: f64) -> Option<[f64; 2]> {
-    let sides = [points.iter().any(|p| p.0 < 0.0), points.iter().any(|p| p.0 > 0.0)];
+/// The slope at time 0 of the cubic fitted to `points` (time, value), and the root mean square of the residuals. `None` if
+/// there are too few points, or none near an end of the span on either side.
+fn cubic(points: &[(f64, f64)], over_s: f64) -> Option<[f64; 2]> {
+    let least = LEAST_SIDE * over_s;
+    let sides = [points.iter().any(|p| p.0 <= -least), points.iter().any(|p| p.0 >= least)];
     if points.len() < FEWEST || sides != [true; 2] {
         return None;
     }
-    let row = |t: f64| Vector3::new(1.0, t / over_s, (t / over_s).powi(2));
-    let (mut gram, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    let row = |t: f64| {
+        let t = t / over_s;
+        Vector4::new(1.0, t, t.powi(2), t.powi(3))
+    };
+    let (mut gram, mut right) = (Matrix4::zeros(), Vector4::zeros());
     for (t, x) in points {
         let row = row(*t);
         gram += row * row.transpose();
@@ -245,7 +253,7 @@ mod tests {
     fn a_turn_has_the_rates_and_the_velocity_of_its_equations() {
         let (rows, _) = derived((0..1000).map(turn).collect());
         for s in &rows[10..990] {
-            // p = −ψ̇ sin θ, q = ψ̇ cos θ sin φ, r = ψ̇ cos θ cos φ; a parabola over the time T has the error ω³ T² / 40
+            // p = −ψ̇ sin θ, q = ψ̇ cos θ sin φ, r = ψ̇ cos θ cos φ; the error of a cubic over the time T is far below the tolerance
             let exact = [
                 -0.6 * 0.1_f64.sin(),
                 0.6 * 0.1_f64.cos() * 0.5_f64.sin(),

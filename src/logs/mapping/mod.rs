@@ -15,7 +15,7 @@
 //!
 //! A column's value is scale × field + offset. `instance` selects one of several sources of a topic: by its number (ULog,
 //! DataFlash, ROS bag) or by system/component (telemetry log). With `rate_over_s` the column is the rate of change of the field:
-//! the slope of a parabola fitted to the rows within that many seconds. `[derive] body_rates_over_s` computes p, q, r from roll,
+//! the slope of a cubic fitted to the rows within that many seconds. `[derive] body_rates_over_s` computes p, q, r from roll,
 //! pitch and yaw in the same way. `[board]` rotates the axes of a log, see [`Board`]. `[sensors]` describes sensors and wind, see
 //! [`Sensors`].
 //!
@@ -83,7 +83,7 @@ pub struct Entry {
     pub offset: f64,
     /// The instance of the topic; `None` if the reader of the log chooses it.
     pub instance: Option<u16>,
-    /// If the column is the rate of change of the field: time span of the fitted parabola, s. Otherwise `None`.
+    /// If the column is the rate of change of the field: time span of the fitted cubic, s. Otherwise `None`.
     pub rate_over_s: Option<f64>,
 }
 
@@ -192,7 +192,7 @@ impl Mapping {
         self.body_rates_over_s
     }
 
-    /// The columns that are rates of change of a field, each with the time span of the fitted parabola, s.
+    /// The columns that are rates of change of a field, each with the time span of the fitted cubic, s.
     pub(super) fn slopes(&self) -> impl Iterator<Item = (&str, f64)> {
         self.entries.iter().filter_map(|(column, e)| Some((column.as_str(), e.rate_over_s?)))
     }
