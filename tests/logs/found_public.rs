@@ -119,7 +119,7 @@ fn what_stands_on_the_ground_has_no_dead_sensors_and_no_vane_in_degrees() {
 #[test]
 fn a_log_without_its_first_imu_is_noted() {
     let whole = dataflash(&samples(500));
-    let (mut thin, mut at, mut lengths) = (Vec::new(), 0, [89; 256]);
+    let (mut thin, mut at, mut lengths) = (Vec::new(), 0, [89usize; 256]);
     while at < whole.len() {
         let record = &whole[at..at + lengths[usize::from(whole[at + 2])]];
         if record[2] == 128 {
