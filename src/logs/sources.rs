@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::finding::Finding;
 use super::mapping::rule::Rule;
-use super::topics::{Topic, Topics, period_s};
+use super::topics::{Naming, Topic, Topics, period_s};
 
 /// Instance of a topic that the user requests: `--source airspeed=1`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -88,9 +88,10 @@ impl Choice {
         let mut names: Vec<&str> = rules.iter().map(|r| r.topic.as_str()).collect();
         names.sort_unstable();
         names.dedup();
-        for name in names {
+        for name in &names {
             choice.topic(topics, name, rules, asked);
         }
+        choice.findings.extend(without_first(topics, &names, rules, asked));
         choice
     }
 
@@ -173,10 +174,60 @@ fn said(name: &str, sources: &[Source], asked: bool) -> Option<Finding> {
     }
 }
 
+/// Finding about the topics of `names` that have no instance 0, unless the user or a rule states the instance that is read.
+/// pymavlink 2.4.50's `mavlogdump --reduce 2` leaves out the first of two sensors (`findings/mavlogdump-thinned-sensors.sh`).
+fn without_first(
+    topics: &Topics,
+    names: &[&str],
+    rules: &[Rule],
+    asked: &[Asked],
+) -> Option<Finding> {
+    if topics.naming != Naming::Number {
+        return None;
+    }
+    let stated = |name: &str| {
+        let by_rule = rules.iter().any(|r| r.topic == name && r.instance.is_some());
+        by_rule || asked.iter().any(|a| a.topic == name)
+    };
+    let lacking = names.iter().filter(|name| !stated(name)).filter_map(|name| {
+        let (first, _) = topics.instances(name).next()?;
+        (first > 0).then(|| format!("{name} has instance {first} and no instance 0"))
+    });
+    let lacking: Vec<String> = lacking.collect();
+    (!lacking.is_empty()).then(|| {
+        Finding::note(format!(
+            "{}: the first sensor is switched off, or the log was thinned (pymavlink's mavlogdump --reduce 2 leaves out the \
+             first of two sensors); give a thinned log as it was recorded",
+            lacking.join(", ")
+        ))
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::stretches::Keep;
+
+    #[test]
+    fn a_topic_without_its_first_instance_is_noted() {
+        let said = |instances: &[u16], naming: Naming, asked: &[Asked]| {
+            let mut topics = Topics { naming, ..Topics::default() };
+            for instance in instances {
+                let mut topic = Topic::new(["GyrX"], Keep::All);
+                (0..3).for_each(|k| topic.push(f64::from(k), &[f64::from(k)]));
+                topics.topics.insert(("IMU".to_owned(), *instance), topic);
+            }
+            let rules = [Rule::linear("p_radps", "IMU", "GyrX", 1.0)];
+            let choice = Choice::of(&topics, &rules, asked);
+            let texts = choice.findings.iter().map(|f| f.text.as_str());
+            texts.collect::<Vec<_>>().join("; ").contains("has instance 1 and no instance 0")
+        };
+        assert!(said(&[1], Naming::Number, &[]) && said(&[1, 2], Naming::Number, &[]));
+        assert!(!said(&[0], Naming::Number, &[]) && !said(&[0, 1], Naming::Number, &[]));
+        // the instance of a MAVLink log is its sender, and what the user asked for is known to the user
+        assert!(!said(&[1], Naming::Sender, &[]));
+        assert!(!said(&[1], Naming::Number, &[Asked { topic: "IMU".into(), instance: 1 }]));
+    }
 
     #[test]
     fn an_instance_that_is_asked_for_is_read_though_the_rule_names_another_one() {

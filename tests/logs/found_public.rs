@@ -114,6 +114,31 @@ fn what_stands_on_the_ground_has_no_dead_sensors_and_no_vane_in_degrees() {
     assert!(!said.contains("spike"), "{said}");
 }
 
+/// pymavlink 2.4.50's `mavlogdump --reduce 2` keeps one of two sensors whole and nothing of the first one
+/// (findings/mavlogdump-thinned-sensors.sh).
+#[test]
+fn a_log_without_its_first_imu_is_noted() {
+    let whole = dataflash(&samples(500));
+    let (mut thin, mut at, mut lengths) = (Vec::new(), 0, [89usize; 256]);
+    while at < whole.len() {
+        let record = &whole[at..at + lengths[usize::from(whole[at + 2])]];
+        if record[2] == 128 {
+            lengths[usize::from(record[3])] = usize::from(record[4]);
+        }
+        // of the IMU (type 2) the instance follows the time
+        if record[2] != 2 || record[11] != 0 {
+            thin.extend_from_slice(record);
+        }
+        at += record.len();
+    }
+    let note = "note: IMU has instance 1 and no instance 0: ";
+    let said_of = |bytes: &[u8]| said(&looked("flight.bin", bytes));
+    let thinned = said_of(&thin);
+    assert!(thinned.contains(note) && thinned.contains("mavlogdump --reduce 2"), "{thinned}");
+    assert_eq!(thinned.matches("and no instance 0").count(), 1, "{thinned}");
+    assert!(!said_of(&whole).contains("and no instance 0"));
+}
+
 #[test]
 fn a_record_that_lost_a_byte_gives_no_numbers() {
     let truth = samples(500);

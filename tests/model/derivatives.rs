@@ -240,6 +240,7 @@ fn what_a_method_does_not_compute_is_named_and_not_taken() {
     for part in ["Clda is 0", "Cmde is 0", "Cndr is 0", "ignores deflected surfaces"] {
         assert!(said.contains(part), "{part}: {said}");
     }
+    assert!(said.contains("from OptVL or AVL") && !said.contains("AeroBuildup"), "{said}");
     let textbook = model(&lattice);
     assert!(value(&textbook, "pitch_linear.Cmde") < -0.3, "the textbook's elevator stands in");
     let line = read(&computed("trainer-liftingline"), &beside()).unwrap();
@@ -249,6 +250,44 @@ fn what_a_method_does_not_compute_is_named_and_not_taken() {
     }
     assert!(value(&model(&line), "roll_linear.Clp") < -0.2);
     assert!(said.lines().count() <= 3, "{said}");
+}
+
+/// AeroSandbox 4.2.10 has no pitching moment of a flapped section (findings/aerosandbox-elevon-moment.sh), OptVL has.
+#[test]
+fn aerosandboxs_elevons_are_not_believed_on_a_flying_wing() {
+    let mut wing = beside();
+    (wing.measures.tail, wing.measures.rudder) = (Tail::FlyingWing, None);
+    let textbook = model(&read(&computed("trainer-vortexlatticemethod"), &wing).unwrap());
+    for (name, tool) in [("aerobuildup", "AeroBuildup"), ("liftingline", "lifting line")] {
+        let read = read(&computed(&format!("trainer-{name}")), &wing).unwrap();
+        let own: Vec<_> = read.warnings.iter().filter(|w| w.starts_with("Cmde = ")).collect();
+        assert_eq!(own.len(), 1, "{:?}", read.warnings);
+        let words = [tool, "is not used", "wrong sign", "from OptVL or AVL"];
+        assert!(words.iter().all(|w| own[0].contains(w)), "{own:?}");
+        let model = model(&read);
+        for name in ["pitch_linear.Cmde", "lift_linear.CLde"] {
+            assert_eq!(value(&model, name), value(&textbook, name), "{name}");
+        }
+        assert!(value(&model, "lift_linear.CLalpha") != value(&textbook, "lift_linear.CLalpha"));
+    }
+    let optvl = read(&computed("trainer-optvl"), &wing).unwrap();
+    close(&model(&optvl), "pitch_linear.Cmde", -0.030_271_617_678_079_15f64.to_degrees());
+}
+
+/// The moment of each control is turned to our sign, so that a wrong one shows in the force.
+#[test]
+fn a_control_whose_force_and_moment_contradict_each_other_is_named() {
+    let with = |old: &str, new: &str| {
+        assert!(text(0.0).contains(old));
+        read(&text(0.0).replace(old, new), &beside()).unwrap().warnings.join("\n")
+    };
+    let said = with("Cmd02 =  -0.030000", "Cmd02 =   0.030000");
+    assert!(said.contains("CLde = -0.573 and Cmde = -1.719 have the same sign"), "{said}");
+    // an elevon at half a chord, taken for an elevator
+    let said = with("Cmd02 =  -0.030000", "Cmd02 =  -0.005000");
+    assert!(said.contains("Cmde = -0.286") && said.contains("--tail flying-wing"), "{said}");
+    let said = with("Cnd03 =   0.001200", "Cnd03 =  -0.001200");
+    assert!(said.contains("CYdr = -0.172 and Cndr = -0.0688 have the same sign"), "{said}");
 }
 
 #[test]

@@ -12,18 +12,25 @@ const PITCH_DAMPING: f64 = 1.0;
 const YAW_DAMPING: f64 = 8e-3;
 /// Smallest magnitude of the derivative of a control's primary moment, 1/rad.
 const CONTROL: f64 = 5e-3;
+/// Smallest distance of an elevator's lift behind the centre of gravity, in chords, of an aircraft with a tail. Tails have 2 and
+/// more, elevons less than 1.
+const TAIL_ARM: f64 = 1.0;
 /// Range of plausible lift slopes of a whole aircraft, 1/rad.
 const SLOPES: std::ops::RangeInclusive<f64> = 1.0..=8.0;
 
 /// Removes from `values` those that `tool` cannot have computed. Returns warnings about these and about implausible values.
 pub(super) fn doubtful(tool: Tool, measures: &Measures, values: &mut Vec<Value>) -> Vec<String> {
-    let of = |name: &str| values.iter().find(|(full, _)| full.ends_with(name)).map(|(_, x)| *x);
+    let of = |name: &str| named(values, name);
     let slope = of(".CLalpha").unwrap_or(0.0);
     let mut warnings = Vec::new();
     let mut out: Vec<&str> = Vec::new();
     for (control, moment, all) in CONTROLS {
-        if of(moment).is_some_and(|x| x.abs() < CONTROL) {
-            let name = &moment[1..];
+        let Some(x) = of(moment) else { continue };
+        let name = &moment[1..];
+        if moment == ".Cmde" && measures.tail == Tail::FlyingWing && !tool.has_flap_moment() {
+            warnings.push(format!("{name} = {x:.4} is not used: {}", tool.of_elevons()));
+            out.extend(all);
+        } else if x.abs() < CONTROL {
             warnings.push(format!("{name} is 0 in the file: {}", tool.of_controls(control)));
             out.extend(all);
         }
@@ -53,9 +60,16 @@ pub(super) fn doubtful(tool: Tool, measures: &Measures, values: &mut Vec<Value>)
         warnings.push(found.0);
         out.extend(found.1);
     }
-    odd(&of, slope, &mut warnings);
     values.retain(|(full, _)| !out.iter().any(|name| full.ends_with(name)));
+    let of = |name: &str| named(values, name);
+    odd(&of, slope, &mut warnings);
+    misplaced(&of, measures.tail, &mut warnings);
     warnings
+}
+
+/// The value whose full name ends with `name`.
+fn named(values: &[Value], name: &str) -> Option<f64> {
+    values.iter().find(|(full, _)| full.ends_with(name)).map(|(_, x)| *x)
 }
 
 /// The controls. Each has the name of the derivative of its primary moment, and the names of all its derivatives.
@@ -82,6 +96,32 @@ fn odd(of: &dyn Fn(&str) -> Option<f64>, slope: f64, warnings: &mut Vec<String>)
         warnings.push(format!(
             "Cnbeta = {x:.4} turns the nose away from the wind: see that the fin is in the geometry and sideslip is positive \
              with wind from the right"
+        ));
+    }
+}
+
+/// Appends warnings about controls whose force and moment contradict each other. The reader of the file turns each control until
+/// its primary moment has this program's sign, so that a wrong sign of Cmde or Cndr shows in CLde or CYdr. The aileron has no
+/// such force.
+fn misplaced(of: &dyn Fn(&str) -> Option<f64>, tail: Tail, warnings: &mut Vec<String>) {
+    if let Some((lift, moment)) = of(".CLde").zip(of(".Cmde")) {
+        let least = if tail == Tail::Conventional { TAIL_ARM } else { 0.0 };
+        if lift < 0.0 {
+            warnings.push(format!(
+                "CLde = {lift:.3} and Cmde = {moment:.3} have the same sign: unless it is a canard, an elevator that pitches the \
+                 nose down adds lift; see the signs of CL and Cm in the file"
+            ));
+        } else if moment > -least * lift {
+            warnings.push(format!(
+                "Cmde = {moment:.3} with CLde = {lift:.3} is of an elevator less than a chord behind the centre of gravity: give \
+                 --tail flying-wing if it is an elevon, else see the reference chord and point"
+            ));
+        }
+    }
+    if let Some((side, moment)) = of(".CYdr").zip(of(".Cndr")).filter(|(side, _)| *side < 0.0) {
+        warnings.push(format!(
+            "CYdr = {side:.3} and Cndr = {moment:.4} have the same sign: a rudder behind the centre of gravity that yaws the nose \
+             left pushes to the right; see the signs of CY and Cn in the file"
         ));
     }
 }

@@ -79,12 +79,26 @@ impl Tool {
     pub(super) fn of_controls(self, control: &str) -> String {
         match self {
             Tool::AeroSandboxLattice => format!(
-                "AeroSandbox's lattice ignores deflected surfaces; the {control}'s coefficients are textbook estimates. Take controls from AeroBuildup or OptVL"
+                "AeroSandbox's lattice ignores deflected surfaces; the {control}'s coefficients are textbook estimates. Take controls from OptVL or AVL"
             ),
             _ => format!(
                 "see that the {control} has a gain in the geometry; its coefficients are textbook estimates"
             ),
         }
+    }
+
+    /// Whether the tool computes the pitching moment of a wing section by its flap. AeroSandbox 4.2.10 treats a flap as a change
+    /// of the angle of attack, so that Cmde of an elevon is far too small or has the wrong sign
+    /// (`findings/aerosandbox-elevon-moment.sh`). On a tail the moment of the lift outweighs it.
+    pub(super) fn has_flap_moment(self) -> bool {
+        !matches!(self, Tool::AeroBuildup | Tool::LiftingLine)
+    }
+
+    /// Text for the user: why Cmde of a flying wing is not used.
+    pub(super) fn of_elevons(self) -> String {
+        format!(
+            "{self} (4.2.10) leaves out a flapped section's own pitching moment, which makes an elevon's far too small or of the wrong sign; CLde, Cmde are textbook estimates. Take them from OptVL or AVL"
+        )
     }
 
     /// Text for the user: why a damping derivative may be missing.
