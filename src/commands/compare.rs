@@ -24,6 +24,8 @@ use crate::sysid::amend::Origin;
 use crate::sysid::compare::{Answer, Comparison, HorizonScore, ModelResult, Options, compare};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
+#[cfg(feature = "study")]
+use crate::sysid::progress::ignore_progress;
 
 /// Letters that identify the models in the tables: A to Z, then AA to ZZ, and so on without an end.
 fn letters() -> impl Iterator<Item = String> {
@@ -96,7 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     in_doubt |= comparison.flights.len() < arguments.logs.paths.len();
     notes.append(&mut comparison.notes);
     comparison.notes = notes;
-    comparison.answer = answer(arguments, &models, &flights, &comparison)?;
+    comparison.answer = answer(arguments, &models, &flights, &mut comparison)?;
     if !files::is_stdout(arguments.json.as_deref()) {
         print(&comparison);
     }
@@ -122,13 +124,16 @@ fn traced(
     arguments: &Arguments,
     models: &[GreyBox],
     flights: &[Reconstruction],
-    comparison: &Comparison,
+    comparison: &mut Comparison,
 ) -> Result<Option<Answer>> {
     let ([before, _], [_, after]) = (models, &arguments.models[..]) else { return Ok(None) };
     let Some(origin) = Origin::beside(&files::shipped(after), before) else { return Ok(None) };
     let tuned = origin.tuned(before).unwrap_or_else(|| before.clone());
-    let tuned = crate::sysid::compare::scores(&tuned, flights, &arguments.horizons)?;
-    Ok(Some(origin.answer(comparison, &tuned, &arguments.logs.paths)))
+    let options = Options { horizons_s: arguments.horizons.clone(), seed: arguments.seed };
+    let tuned = compare(&[tuned], flights, &options, &ignore_progress)?.models.remove(0);
+    let answer = origin.answer(comparison, &tuned.free_run, &arguments.logs.paths);
+    comparison.tuned = Some(tuned);
+    Ok(Some(answer))
 }
 
 /// `None`: a build without the feature `study` cannot read the files of an amendment.
@@ -137,7 +142,7 @@ fn traced(
     _: &Arguments,
     _: &[GreyBox],
     _: &[Reconstruction],
-    _: &Comparison,
+    _: &mut Comparison,
 ) -> Result<Option<Answer>> {
     Ok(None)
 }
@@ -147,7 +152,7 @@ fn answer(
     arguments: &Arguments,
     models: &[GreyBox],
     flights: &[Reconstruction],
-    comparison: &Comparison,
+    comparison: &mut Comparison,
 ) -> Result<Answer> {
     let traced = traced(arguments, models, flights, comparison)?;
     let answer = traced.unwrap_or_else(|| comparison.answer.clone());

@@ -68,6 +68,10 @@ pub struct Arguments {
     force: bool,
 }
 
+/// Note on a model that `amend` refuses.
+const WITH_RESIDUAL: &str = "The model has a learned residual, which was fitted with its coefficients: an effect is added to the \
+                             model without it (its prior), and the residual is then learned again.";
+
 /// Reads the logs, reconstructs the flights and diagnoses the model. Prints sentences and tables, and writes JSON and report.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
@@ -97,7 +101,13 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     diagnosis.notes = notes;
     let Diagnosed { tuned, answer } = diagnosed(&model, &flights, &diagnosis)?;
     let words = file_words(&arguments.effects)?;
-    let next = next::next(arguments, &diagnosis, &words, answer.numbers.change_percent);
+    let next = match &model.residual {
+        Some(_) => {
+            diagnosis.notes.push(WITH_RESIDUAL.into());
+            String::new()
+        }
+        None => next::next(arguments, &diagnosis, &words, answer.numbers.change_percent),
+    };
     let answer = answer.then(next);
     // the page is drawn before anything is written, so that Ctrl-C leaves no file behind
     let drawn = arguments.report.as_ref().map(|path| {

@@ -277,7 +277,7 @@ mod tests {
         assert_eq!(
             said,
             [
-                "Best: lqi. It stays in the envelope in all 8 flights and settles on average within 0.100° of the command \
+                "Best: lqi. It keeps its limits of load factor and angle of attack in all 8 flights and settles on average within 0.100° of the command \
                  (95 %: 0.100 to 0.100°).",
                 "Its worst target: roll +10°, pitch +5°, settled error 0.100°.",
                 "Behind it: hybrid 0.250°.",
@@ -288,7 +288,10 @@ mod tests {
         assert_eq!(alike[2], "Not distinguished from it by these targets: lqi 0.100°.");
         assert!(answer::sentences(&[]).is_empty());
         let alone = answer::sentences(&[evaluated("lqi", 0.1)]);
-        assert!(alone[0].starts_with("lqi stays in the envelope"), "{alone:?}");
+        assert!(
+            alone[0].starts_with("lqi keeps its limits of load factor and angle of attack"),
+            "{alone:?}"
+        );
     }
 
     #[test]
@@ -366,7 +369,7 @@ mod tests {
             "Flown in JSBSim; model exact &lt;model&gt;",
             "hybrid in the paper",
             "Next: <code>greylag demo --controller lqi</code>",
-            "<p>Best: lqi. It stays in the envelope in all",
+            "<p>Best: lqi. It keeps its limits of load factor and angle of attack in all",
             "0.440 [0.410, 0.490]",
             "Roll seen ahead at 0.10 s",
             "plan flown",

@@ -24,7 +24,7 @@ fn share(model: &ModelResult, id: ChannelId) -> Option<f64> {
 pub(crate) fn of_comparison(c: &Comparison) -> String {
     let effects: Vec<&str> = c.answer.numbers.effects.iter().map(|e| e.id.as_str()).collect();
     let added = match &c.models[..] {
-        [given, after] => of_added(&effects, given, None, after),
+        [given, after] => of_added(&effects, given, c.tuned.as_ref(), after),
         _ => None,
     };
     added.unwrap_or_else(|| of_models(&c.models))
@@ -105,14 +105,6 @@ fn ratio(share: f64) -> String {
     format!("{ratio:.places$}")
 }
 
-fn kind(channel: ChannelId) -> &'static str {
-    match channel {
-        ChannelId::Roll | ChannelId::Pitch | ChannelId::Yaw => "moment",
-        ChannelId::Drag | ChannelId::Lift | ChannelId::Side => "force",
-        _ => "rate",
-    }
-}
-
 /// Sentence on the channel in which the first model leaves the largest share unexplained. It includes the shares that the other
 /// models leave in this channel. Empty without finite shares.
 pub(crate) fn of_models(models: &[ModelResult]) -> String {
@@ -129,13 +121,13 @@ pub(crate) fn of_models(models: &[ModelResult]) -> String {
         [] if left > MULTIPLE => {
             let lively = shares.find(|(_, share)| *share <= MULTIPLE);
             let lively = lively.map_or(String::new(), |(id, share)| {
-                format!(" Of the livelier channels: {}, {} times.", id.name(), ratio(share))
+                let unexplained = number(100.0 * share);
+                format!(" Of the other channels: {}, {unexplained} % unexplained.", id.name())
             });
             format!(
-                "Where it fails: most in {name}: its error is {} times what the {} varies by, which is tiny in \
-                 these flights (a quiet axis).{lively}",
-                ratio(left),
-                kind(channel)
+                "Where it fails: most in {name}, which hardly varies in these flights (a quiet axis): its error is {} times \
+                 its variation.{lively}",
+                ratio(left)
             )
         }
         [] => {
@@ -210,8 +202,8 @@ mod tests {
         let quiet = model("m", &[(Lift, 0.1), (Pitch, 723.61), (Yaw, 2.02), (Alpha, 5.0)]);
         assert_eq!(
             of_models(&[quiet]),
-            "Where it fails: most in pitching moment: its error is 27 times what the moment varies by, which is tiny in \
-             these flights (a quiet axis). Of the livelier channels: yawing moment, 1.4 times."
+            "Where it fails: most in pitching moment, which hardly varies in these flights (a quiet axis): its error is 27 times \
+             its variation. Of the other channels: yawing moment, 202 % unexplained."
         );
         // the rates are named only in the place of forces
         let rates = model("m", &[(Lift, 0.1), (Alpha, 5.0)]);

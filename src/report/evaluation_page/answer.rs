@@ -4,6 +4,8 @@ use super::label;
 use crate::kit::numbers::{attitude, number};
 use greylag_sim::evaluation::{Evaluation, Score};
 
+/// The limits that count as the envelope here.
+const KEEPS: &str = "keeps its limits of load factor and angle of attack";
 /// Group of targets over which controllers are ranked if the evaluation contains it.
 const ALL: &str = "all";
 /// A controller ranks behind the others if its fraction of flights that keep the envelope is more than this below the largest
@@ -69,9 +71,9 @@ fn leader(all: &[Evaluation], (best, score): Ranked, alone: bool) -> String {
     };
     let envelope = match outside(score) {
         None => String::new(),
-        Some(0) if score.count == 1 => "stays in the envelope and ".into(),
-        Some(0) => format!("stays in the envelope in all {flights} and "),
-        Some(left) => format!("stays in the envelope in {} of {flights} and ", score.count - left),
+        Some(0) if score.count == 1 => format!("{KEEPS} and "),
+        Some(0) => format!("{KEEPS} in all {flights} and "),
+        Some(left) => format!("{KEEPS} in {} of {flights} and ", score.count - left),
     };
     let over = if envelope.is_empty() { format!(" over {flights}") } else { String::new() };
     let [low, high] = score.mean_ci95_deg.map(number);

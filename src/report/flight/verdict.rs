@@ -201,7 +201,8 @@ fn details(report: &FlightReport) -> Vec<String> {
     }
     if report.envelope.is_some() {
         details.push(format!(
-            "The envelope counts as kept when load factor and angle of attack pass their limits by at most {} %.",
+            "The envelope counts as kept when load factor and angle of attack pass their limits by at most {} %; times outside \
+             the limits of bank, pitch and airspeed are stated beside it.",
             100.0 * TRANSIENT
         ));
     }

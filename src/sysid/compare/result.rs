@@ -26,6 +26,10 @@ pub struct Comparison {
     pub sentences: Vec<String>,
     /// The models, in the order of the command line.
     pub models: Vec<ModelResult>,
+    /// If the second model is an amendment of the first: the first with the coefficients that the amendment tuned without added
+    /// effects. It tells on a page what tuning alone achieves.
+    #[serde(skip)]
+    pub tuned: Option<ModelResult>,
     /// Free-run errors of baseline forecasts without aerodynamics.
     pub forecasts: Vec<ForecastResult>,
     /// The flights, in the order of the command line.

@@ -91,6 +91,7 @@ pub fn compare(
         seed: options.seed,
         sentences: models[0].sentences.clone(),
         models,
+        tuned: None,
         forecasts,
         flights: prepared.iter().zip(used).map(|(p, from)| flight::result(p, from)).collect(),
         settings: Settings {

@@ -32,7 +32,8 @@ pub fn impossible(flights: &[&Reconstruction], tuned: &[Tuned]) -> Vec<String> {
         let all = all.map(|(n, why)| sentence(&flight.name, n, why)).chain(wind);
         all.collect::<Vec<_>>()
     };
-    flights.iter().flat_map(of_flight).chain(tuned.iter().filter_map(coefficient)).collect()
+    let of_coefficient = |t: &Tuned| coefficient(t, flights.len());
+    flights.iter().flat_map(of_flight).chain(tuned.iter().filter_map(of_coefficient)).collect()
 }
 
 fn sentence(flight: &str, n: &Nuisance, why: &str) -> String {
@@ -81,13 +82,18 @@ fn wind(flight: &Reconstruction, airspeed: f64) -> Option<String> {
     })
 }
 
-/// A sentence on a damping derivative with the wrong sign or on a lift slope near zero; `None` for any other estimate.
-fn coefficient(t: &Tuned) -> Option<String> {
+/// A sentence on a damping derivative with the wrong sign or on a lift slope near zero; `None` for any other estimate. `flights`
+/// is the number of flights to which the coefficient was fitted.
+fn coefficient(t: &Tuned, flights: usize) -> Option<String> {
     let own = t.name.rsplit('.').next()?;
     let damps = ["Cmq", "Clp", "Cnr"].contains(&own);
     let drives = damps && t.prior < 0.0 && t.value - SURELY * t.sd > 0.0;
     let no_wing = own == "CLalpha" && t.value + SURELY * t.sd < NO_WING * t.prior;
     let why = match (drives, no_wing) {
+        (true, _) if flights == 1 => {
+            "a damping that drives. On a single flight a missing effect can cause it: diagnose several flights together. If it \
+             stays, look for a hover, a wrong axis or sign, or a clock that is off"
+        }
         (true, _) => {
             "a damping that drives; look for a hover, a wrong axis or sign, or a clock that is off"
         }
@@ -125,9 +131,11 @@ mod tests {
             value,
             sd: 0.05,
         };
-        assert!(coefficient(&of("pitch_linear.Cmq", -1.0, 1.6)).is_some());
-        assert!(coefficient(&of("pitch_linear.Cmq", -1.0, 0.1)).is_none());
-        assert!(coefficient(&of("lift_linear.CLalpha", 5.3, 0.24)).is_some());
-        assert!(coefficient(&of("lift_linear.CLalpha", 5.3, 4.0)).is_none());
+        let one = coefficient(&of("pitch_linear.Cmq", -1.0, 1.6), 1).unwrap();
+        let two = coefficient(&of("pitch_linear.Cmq", -1.0, 1.6), 2).unwrap();
+        assert!(one.contains("several flights") && !two.contains("several flights"));
+        assert!(coefficient(&of("pitch_linear.Cmq", -1.0, 0.1), 1).is_none());
+        assert!(coefficient(&of("lift_linear.CLalpha", 5.3, 0.24), 1).is_some());
+        assert!(coefficient(&of("lift_linear.CLalpha", 5.3, 4.0), 1).is_none());
     }
 }
