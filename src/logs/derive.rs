@@ -13,9 +13,10 @@ use super::columns::{COLUMNS, index};
 use super::mapping::Mapping;
 use greylag_num::statistics::quantile;
 
-/// Smallest number of rows to which a cubic is fitted.
-const FEWEST: usize = 6;
-/// Time before and after a row that must have samples, as a fraction of the time span. The slope at the end of a span is noisy.
+/// Smallest number of rows to which a polynomial is fitted.
+const FEWEST: usize = 5;
+/// Time before and after a row that must have samples for a cubic, as a fraction of the time span. The slope of a cubic at the end
+/// of a span is noisy.
 const LEAST_SIDE: f64 = 0.2;
 /// The measurement counts as a jump if the residual of a cubic exceeds the log's median residual by this factor.
 const JUMPED: f64 = 8.0;
@@ -176,19 +177,21 @@ fn around<T, R>(
     (0..samples.len()).map(one).collect()
 }
 
-/// The slope at time 0 of the cubic fitted to `points` (time, value), and the root mean square of the residuals. `None` if
-/// there are too few points, or none near an end of the span on either side.
+/// The slope at time 0 of the cubic fitted to `points` (time, value), and the root mean square of the residuals. Near the end of
+/// a record a parabola takes its place. `None` if there are too few points, or none on one side.
 fn cubic(points: &[(f64, f64)], over_s: f64) -> Option<[f64; 2]> {
-    let least = LEAST_SIDE * over_s;
-    let sides = [points.iter().any(|p| p.0 <= -least), points.iter().any(|p| p.0 >= least)];
-    if points.len() < FEWEST || sides != [true; 2] {
+    let within =
+        |least: f64| points.iter().any(|p| p.0 < -least) && points.iter().any(|p| p.0 > least);
+    if points.len() < FEWEST || !within(0.0) {
         return None;
     }
+    let third = if within(LEAST_SIDE * over_s) { 1.0 } else { 0.0 };
     let row = |t: f64| {
         let t = t / over_s;
-        Vector4::new(1.0, t, t.powi(2), t.powi(3))
+        Vector4::new(1.0, t, t.powi(2), third * t.powi(3))
     };
-    let (mut gram, mut right) = (Matrix4::zeros(), Vector4::zeros());
+    let mut gram = Matrix4::from_diagonal(&Vector4::new(0.0, 0.0, 0.0, 1.0 - third));
+    let mut right = Vector4::zeros();
     for (t, x) in points {
         let row = row(*t);
         gram += row * row.transpose();
