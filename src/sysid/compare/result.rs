@@ -26,8 +26,7 @@ pub struct Comparison {
     pub sentences: Vec<String>,
     /// The models, in the order of the command line.
     pub models: Vec<ModelResult>,
-    /// If the second model is an amendment of the first: the first with the coefficients that the amendment tuned without added
-    /// effects. It tells on a page what tuning alone achieves.
+    /// The first model with the coefficients that the amendment tuned without added effects, if the second model is its amendment.
     #[serde(skip)]
     pub tuned: Option<ModelResult>,
     /// Free-run errors of baseline forecasts without aerodynamics.
