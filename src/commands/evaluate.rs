@@ -250,7 +250,7 @@ fn page(
 }
 
 /// The `greylag demo` command for the best controller. It is empty if several models were given, or several policies and the
-/// controller uses one, because the controller's name does not say which of them it used. It is also empty for a user's own
+/// controller uses one, because the controller's name does not state which of them it used. It is also empty for a user's own
 /// aircraft, because the command would have to repeat the options of the aircraft.
 fn next(arguments: &Arguments, evaluations: &[Evaluation], plant: &PlantOptions) -> String {
     let best = evaluation_best(evaluations);

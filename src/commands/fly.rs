@@ -296,7 +296,7 @@ pub fn model(path: &Path, airframe: Option<&Path>) -> anyhow::Result<GreyBox> {
 /// The companion of `greylag fly`: the controller `kind`, and a pilot that checks and limits the commands in each cycle. The
 /// pilot has the envelope limiter of `model` and a fallback controller. `folder` holds the policy, see
 /// [`controllers::policy`](crate::commands::controllers::policy). The fallback is an LQI of the same model. If no LQI can
-/// be designed, the fallback is `pid-retuned`, and a line on standard error says so.
+/// be designed, the fallback is `pid-retuned`, and a line on standard error states this.
 ///
 /// # Errors
 /// If the policy cannot be read or belongs to another airframe, if `kind` cannot be built from the model, or if the model
@@ -337,7 +337,7 @@ pub fn companion_with_planner(
 }
 
 /// The fallback controller of `model`: an LQI. If no LQI can be designed, it is `pid-retuned`, and a line on standard error
-/// says so.
+/// states this.
 ///
 /// # Errors
 /// If `pid-retuned` cannot be built either.

@@ -78,7 +78,7 @@ impl Bench {
 
 impl Inner {
     /// Adds a log that cannot be used, for the reason `why`. If the session has a log of the same path, it is kept; its own error
-    /// says that the file has changed.
+    /// states that the file has changed.
     fn take_unusable(&mut self, entry: LogEntry, why: String) {
         let there = self.session.logs.iter().any(|l| self.folder.join(&l.path) == entry.path);
         if !there {

@@ -4,7 +4,7 @@ use super::{Acts, InputEffect, Past, ServoElevator};
 use crate::effects::{Coefficient, Entry, coefficient};
 use greylag_num::Real;
 
-/// An aileron that turns further than its recorded position says on one side of neutral, and less on the other.
+/// An aileron that turns further than its recorded position on one side of neutral, and less on the other.
 ///
 /// See [`ServoElevator`] for what it has in common with a gain, an offset and effects of the air.
 pub struct ServoAileron;

@@ -4,7 +4,7 @@ use super::{Acts, InputEffect, Past};
 use crate::effects::{Coefficient, Entry, coefficient};
 use greylag_num::Real;
 
-/// An elevator that turns further than its recorded position says on one side of neutral, and less on the other.
+/// An elevator that turns further than its recorded position on one side of neutral, and less on the other.
 ///
 /// An offset of the servo is a trim of the model, and an equal gain on both sides is a factor on its control derivatives. What
 /// remains of a wrong calibration is the difference between the two sides. It changes every force and moment of the elevator by
