@@ -87,12 +87,12 @@ impl LogArguments {
         format!(" --log{logs}{}", self.reading.words())
     }
 
-    /// The command that inspects the logs. It lacks the option for logs with problems, because it names these problems.
+    /// The command that inspects the logs. The file `model` states from which airspeed on the aircraft flies. The command lacks the option for logs with problems, because it names these problems.
     #[cfg(feature = "study")]
-    pub fn inspected(&self) -> String {
+    pub fn inspected(&self, model: &Path) -> String {
         let reading = Reading { despite_problems: false, ..self.reading.clone() };
         let logs: String = self.paths.iter().map(|log| format!(" {}", quoted(log))).collect();
-        format!("greylag logs info{logs}{}", reading.words())
+        format!("greylag logs info{logs}{} --model {}", reading.words(), quoted(model))
     }
 
     /// The options for reading the logs, as arguments of another command.
@@ -282,7 +282,7 @@ mod tests {
     fn the_logs_are_inspected_as_they_were_read() {
         let words = "greylag --log a.csv 'b.csv --mapping m.toml --despite-problems";
         let line = Line::parse_from(words.split(' '));
-        let command = r"greylag logs info a.csv ''\''b.csv' --mapping m.toml";
-        assert_eq!(line.logs.inspected(), command);
+        let command = r"greylag logs info a.csv ''\''b.csv' --mapping m.toml --model m/model.toml";
+        assert_eq!(line.logs.inspected(Path::new("m/model.toml")), command);
     }
 }

@@ -44,7 +44,7 @@ pub(super) fn next(
         (Verdict::Unexplained, _) if arguments.logs.paths.len() < 2 => String::new(),
         (Verdict::Unexplained, _) => format!("greylag propose --model {model}{logs}"),
         // the flights themselves are in doubt, so the logs are inspected first
-        (Verdict::Unknown, _) => arguments.logs.inspected(),
+        (Verdict::Unknown, _) => arguments.logs.inspected(&arguments.model),
     }
 }
 

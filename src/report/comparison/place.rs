@@ -12,6 +12,9 @@ const MULTIPLE: f64 = 10.0;
 const LEAST: f64 = 1e-4;
 /// Share above which the sentence on an added effect names the channel in which most is left.
 const STATED: f64 = 0.005;
+/// A second channel is named beside the first if an effect reduces its unexplained share by at least this fraction of the first
+/// reduction.
+const NAMED_TOO: f64 = 0.3;
 /// Number of channels that are forces and moments, the first of [`ChannelId::ALL`].
 const LOADS: usize = 6;
 
@@ -30,8 +33,8 @@ pub(crate) fn of_comparison(c: &Comparison) -> String {
     added.unwrap_or_else(|| of_models(&c.models))
 }
 
-/// Sentence on the channel in which the `effects` that were added to `after` reduce the unexplained share most, among the
-/// channels in which they act. For effects that act on deflections, all forces and moments are compared. The share is compared
+/// Sentence on the one or two channels in which the `effects` that were added to `after` reduce the unexplained share most, among
+/// the channels in which they act. For effects that act on deflections, all forces and moments are compared. The share is compared
 /// with that of the tuned model, or with that of the given model if `tuned` is unknown. `None` if there is no effect or no
 /// reduction.
 pub(crate) fn of_added(
@@ -44,40 +47,59 @@ pub(crate) fn of_added(
         let fall = share(tuned.unwrap_or(given), *id)? - share(after, *id)?;
         (fall > 0.0).then_some((*id, fall))
     };
-    let best = |ids: &[ChannelId]| {
-        ids.iter().filter_map(fall).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(id, _)| id)
+    let falls = |ids: &[ChannelId]| {
+        let mut falls: Vec<_> = ids.iter().filter_map(fall).collect();
+        falls.sort_by(|a, b| b.1.total_cmp(&a.1));
+        falls.dedup_by_key(|(id, _)| *id);
+        let least = falls.first().map_or(0.0, |(_, most)| NAMED_TOO * most);
+        falls.retain(|(_, fall)| *fall >= least);
+        falls.truncate(2);
+        (!falls.is_empty()).then(|| falls.into_iter().map(|(id, _)| id).collect::<Vec<_>>())
     };
-    let all = ChannelId::ALL;
-    let (loads, rates) = all.split_at(LOADS);
-    let id = best(&acted_on(effects)).or_else(|| best(loads)).or_else(|| best(rates))?;
-    let percent = |model: &ModelResult| {
-        share(model, id).map_or("–".into(), |share| number(100.0 * share.max(0.0)))
-    };
+    let (loads, rates) = ChannelId::ALL.split_at(LOADS);
+    let ids = falls(&acted_on(effects)).or_else(|| falls(loads)).or_else(|| falls(rates))?;
     let (verb, it) = match effects {
         [] => return None,
         [_] => ("acts", "it"),
         _ => ("act", "them"),
     };
-    let (names, with) = (effects.join(" and "), percent(after));
-    let shares = match tuned {
+    let shares: Vec<String> = ids
+        .iter()
+        .map(|id| format!("{}, {}", id.name(), shares(*id, given, tuned, after, it)))
+        .collect();
+    let next = most_left(after, &ids);
+    Some(format!("Where {} {verb}: {}{next}.", effects.join(" and "), shares.join("; ")))
+}
+
+/// The unexplained shares of the channel `id` by each model, %. `it` stands for the effects of `after`.
+fn shares(
+    id: ChannelId,
+    given: &ModelResult,
+    tuned: Option<&ModelResult>,
+    after: &ModelResult,
+    it: &str,
+) -> String {
+    let percent = |model: &ModelResult| {
+        share(model, id).map_or("–".into(), |share| number(100.0 * share.max(0.0)))
+    };
+    let with = percent(after);
+    match tuned {
         Some(tuned) => format!(
             "unexplained {} % as given, {} % tuned, {with} % with {it}",
             percent(given),
             percent(tuned)
         ),
         None => format!("unexplained {} % as given, {with} % tuned and with {it}", percent(given)),
-    };
-    let next = most_left(after, id);
-    Some(format!("Where {names} {verb}: {}, {shares}{next}.", id.name()))
+    }
 }
 
-/// Clause on the force or moment with the largest unexplained share in `after`. It is empty if that is the channel `named`, or if
-/// the share is below [`STATED`].
-fn most_left(after: &ModelResult, named: ChannelId) -> String {
+/// Clause on the force or moment with the largest unexplained share in `after`. It is empty if that is one of the channels `named`,
+/// or if the share is below [`STATED`].
+fn most_left(after: &ModelResult, named: &[ChannelId]) -> String {
     let loads = ChannelId::ALL.into_iter().take(LOADS);
     let left = loads.filter_map(|id| Some((id, share(after, id)?)));
     match left.max_by(|a, b| a.1.total_cmp(&b.1)) {
-        Some((id, left)) if id != named && left > STATED => {
+        Some((id, left)) if !named.contains(&id) && left > STATED => {
             format!("; most left now: {}, {} %", id.name(), number(100.0 * left))
         }
         _ => String::new(),
@@ -105,6 +127,21 @@ fn ratio(share: f64) -> String {
     format!("{ratio:.places$}")
 }
 
+/// Sentence on the channels `quiet`, the worst first, each with its unexplained share. The flights hardly move these channels.
+fn quiet_axes(quiet: &[(&str, f64)]) -> String {
+    let names: Vec<&str> = quiet.iter().map(|(name, _)| *name).collect();
+    let times: Vec<String> = quiet.iter().map(|(_, share)| ratio(*share)).collect();
+    let (verb, axis, errors) = match quiet.len() {
+        1 => ("varies", "a quiet axis", "its error is"),
+        _ => ("vary", "quiet axes", "the errors are"),
+    };
+    format!(
+        "Where it fails: most in {}, which hardly {verb} in these flights ({axis}): {errors} {} times the variation.",
+        names.join(", "),
+        times.join(", ")
+    )
+}
+
 /// Sentence on the channel in which the first model leaves the largest share unexplained. It includes the shares that the other
 /// models leave in this channel. Empty without finite shares.
 pub(crate) fn of_models(models: &[ModelResult]) -> String {
@@ -119,16 +156,17 @@ pub(crate) fn of_models(models: &[ModelResult]) -> String {
         .collect();
     match rest {
         [] if left > MULTIPLE => {
-            let lively = shares.find(|(_, share)| *share <= MULTIPLE);
-            let lively = lively.map_or(String::new(), |(id, share)| {
-                let unexplained = number(100.0 * share);
-                format!(" Of the other channels: {}, {unexplained} % unexplained.", id.name())
-            });
-            format!(
-                "Where it fails: most in {name}, which hardly varies in these flights (a quiet axis): its error is {} times \
-                 its variation.{lively}",
-                ratio(left)
-            )
+            let mut quiet = vec![(name, left)];
+            let mut lively = String::new();
+            for (id, share) in shares {
+                if share <= MULTIPLE {
+                    let unexplained = number(100.0 * share);
+                    lively = format!(" Then {}, {unexplained} % unexplained.", id.name());
+                    break;
+                }
+                quiet.push((id.name(), share));
+            }
+            quiet_axes(&quiet) + &lively
         }
         [] => {
             let worse = if left > 1.0 { ", worse than a constant" } else { "" };
@@ -203,7 +241,7 @@ mod tests {
         assert_eq!(
             of_models(&[quiet]),
             "Where it fails: most in pitching moment, which hardly varies in these flights (a quiet axis): its error is 27 times \
-             its variation. Of the other channels: yawing moment, 202 % unexplained."
+             the variation. Then yawing moment, 202 % unexplained."
         );
         // the rates are named only in the place of forces
         let rates = model("m", &[(Lift, 0.1), (Alpha, 5.0)]);
