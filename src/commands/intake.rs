@@ -87,7 +87,8 @@ impl LogArguments {
         format!(" --log{logs}{}", self.reading.words())
     }
 
-    /// The command that inspects the logs. The file `model` states from which airspeed on the aircraft flies. The command lacks the option for logs with problems, because it names these problems.
+    /// The command that inspects the logs. The file `model` states from which airspeed on the aircraft flies. The command lacks the
+    /// option for logs with problems, because it names these problems.
     #[cfg(feature = "study")]
     pub fn inspected(&self, model: &Path) -> String {
         let reading = Reading { despite_problems: false, ..self.reading.clone() };
