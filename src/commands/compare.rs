@@ -129,6 +129,11 @@ fn traced(
     let ([before, _], [_, after]) = (models, &arguments.models[..]) else { return Ok(None) };
     let Some(origin) = Origin::beside(&files::shipped(after), before) else { return Ok(None) };
     let tuned = origin.tuned(before).unwrap_or_else(|| before.clone());
+    // only the page needs more of the tuned model than its errors
+    if arguments.report.is_none() {
+        let errors = crate::sysid::compare::scores(&tuned, flights, &arguments.horizons)?;
+        return Ok(Some(origin.answer(comparison, &errors, &arguments.logs.paths)));
+    }
     let options = Options { horizons_s: arguments.horizons.clone(), seed: arguments.seed };
     let tuned = compare(&[tuned], flights, &options, &ignore_progress)?.models.remove(0);
     let answer = origin.answer(comparison, &tuned.free_run, &arguments.logs.paths);

@@ -97,11 +97,12 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     for flight in &flights {
         notes.extend(flight.notes.iter().map(|note| format!("{}: {note}", flight.name)));
     }
+    notes.extend(model.residual.as_ref().map(|_| WITH_RESIDUAL.to_owned()));
     notes.append(&mut diagnosis.notes);
     diagnosis.notes = notes;
     let Diagnosed { tuned, answer } = diagnosed(&model, &flights, &diagnosis)?;
     let words = file_words(&arguments.effects)?;
-    let next = following(arguments, &model, &mut diagnosis, answer.numbers.change_percent)?;
+    let next = next::next(arguments, &model, &diagnosis, &words, answer.numbers.change_percent);
     let answer = answer.then(next);
     // the page is drawn before anything is written, so that Ctrl-C leaves no file behind
     let drawn = arguments.report.as_ref().map(|path| {
@@ -130,22 +131,6 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         print_summary(&answer);
     }
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
-}
-
-/// The command to run next; empty for a model with a learned residual, which `amend` refuses. Such a model gets a note. The
-/// change of the error by what was found is `change_percent`.
-fn following(
-    arguments: &Arguments,
-    model: &GreyBox,
-    diagnosis: &mut Diagnosis,
-    change_percent: f64,
-) -> Result<String> {
-    if model.residual.is_some() {
-        diagnosis.notes.push(WITH_RESIDUAL.into());
-        return Ok(String::new());
-    }
-    let words = file_words(&arguments.effects)?;
-    Ok(next::next(arguments, diagnosis, &words, change_percent))
 }
 
 /// Content of the JSON document: the diagnosis, with the answer that the terminal and the page show first.

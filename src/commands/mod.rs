@@ -33,6 +33,8 @@ mod files;
 mod flown_with;
 pub mod fly;
 mod given;
+#[cfg(feature = "study")]
+mod held_out;
 mod intake;
 mod interruption;
 #[cfg(feature = "learn")]

@@ -18,6 +18,7 @@ use greylag_physics::catalogue;
 use greylag_physics::inputs::InputMemory;
 use greylag_physics::rigid_body;
 use greylag_physics::{Controls, State};
+use greylag_sysid::flight_path::ActuatorClock;
 use greylag_sysid::flight_path::reconstruction::{Instant, Reconstruction, Segment};
 use greylag_sysid::progress::{Cancelled, Progress, report};
 use greylag_sysid::separation::{Separation, separation};
@@ -260,6 +261,7 @@ fn imagine(
         name: schedule.name.clone(),
         step_s: STEP_S,
         sampling: Sampling::Held,
+        clock: ActuatorClock::AsRecorded,
         segments: vec![Segment { instants }],
         nuisances: Vec::new(),
         noise,

@@ -23,6 +23,7 @@ use greylag_logs::finding::Finding;
 use greylag_logs::info::Purpose;
 use greylag_logs::phases::Phase;
 use greylag_sysid::compare::{self, FlightResult, ModelResult, compare, free_run};
+use greylag_sysid::flight_path::ActuatorClock;
 use greylag_sysid::flight_path::reconstruction::{Nuisance, Reconstruction};
 use greylag_sysid::progress::ignore_progress;
 
@@ -148,6 +149,7 @@ impl Bench {
         let inner = self.lock();
         let session = &inner.session;
         let names = inner.names(&(0..session.logs.len()).collect::<Vec<_>>());
+        let clock = inner.clock();
         let state = StateView {
             schema: "greylag.workbench/1",
             version: env!("CARGO_PKG_VERSION"),
@@ -158,7 +160,7 @@ impl Bench {
                 "path": session.model.display().to_string(),
                 "changed_outside": inner.model_changed(),
             }),
-            flights: names.into_iter().enumerate().map(|n| flight_view(&inner, n)).collect(),
+            flights: names.into_iter().enumerate().map(|n| flight_view(&inner, clock, n)).collect(),
             diagnosis: result(&inner, &inner.diagnosis, Work::Diagnosis),
             proposal: result(&inner, &inner.proposal, Work::Proposal),
             schedule: json!({ "error": design_failure(&inner) }),
@@ -303,7 +305,7 @@ fn fly_view(inner: &Inner) -> Value {
     })
 }
 
-fn flight_view(inner: &Inner, (k, name): (usize, String)) -> FlightView<'_> {
+fn flight_view(inner: &Inner, clock: ActuatorClock, (k, name): (usize, String)) -> FlightView<'_> {
     let log = &inner.session.logs[k];
     let locked = inner.locked(log);
     let loaded = inner.flights[k].as_ref();
@@ -313,7 +315,7 @@ fn flight_view(inner: &Inner, (k, name): (usize, String)) -> FlightView<'_> {
         role: log.role,
         locked,
         error: loaded.err().map(String::as_str),
-        about: loaded.ok().map(|flight| about(flight, flight.on(inner.clock()).0, locked)),
+        about: loaded.ok().map(|flight| about(flight, flight.on(clock).0, locked)),
     }
 }
 

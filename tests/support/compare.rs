@@ -166,6 +166,7 @@ pub fn as_measured(name: &str, flight: &Flight, noise: Noise) -> Reconstruction 
         name: name.into(),
         step_s: 0.01,
         sampling: greylag::logs::Sampling::Held,
+        clock: greylag::sysid::flight_path::ActuatorClock::AsRecorded,
         segments: vec![Segment { instants: flight.samples.iter().map(instant).collect() }],
         nuisances: Vec::new(),
         noise: noise.state,

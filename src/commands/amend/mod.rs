@@ -22,6 +22,7 @@ use crate::commands::distinct::{distinct, distinct_names};
 use crate::commands::effect_files::{named_effects, own_effects};
 use crate::commands::files::{self, shipped};
 use crate::commands::given as read;
+use crate::commands::held_out;
 use crate::commands::intake::{Intake, LogArguments};
 use crate::commands::per_flight::FitConstantsArguments;
 use crate::commands::status::IN_DOUBT;
@@ -244,8 +245,7 @@ fn check_new(effects: &[String], model: &GreyBox) -> Result<()> {
     Ok(())
 }
 
-/// The flights for validation: those of the files `held`. If `held` is empty, the first flight in `taken` is split: its last
-/// third is returned, and `taken` keeps the first two thirds. With `--fit-all`, the fitted flights are returned.
+/// The flights for validation. With `--fit-all`, the fitted flights are returned.
 fn tests(
     arguments: &Arguments,
     held: Vec<PathBuf>,
@@ -258,19 +258,7 @@ fn tests(
         );
         return Ok(taken.flights.clone());
     }
-    if held.is_empty() {
-        taken.notes.push(format!(
-            "{}: fitted to its first two thirds, judged by the last",
-            taken.flights[0].name
-        ));
-        let [first, last] = amend::split(&taken.flights[0]);
-        taken.flights = vec![first];
-        return Ok(vec![last]);
-    }
-    let more = arguments.logs.of(held).take_in(model, ActuatorClock::AsRecorded)?;
-    taken.notes.extend(more.notes);
-    taken.in_doubt |= more.in_doubt;
-    Ok(more.flights)
+    held_out::validation(&arguments.logs, held, (model, ActuatorClock::AsRecorded), taken)
 }
 
 /// The report as HTML, with the errors of open-loop simulations of the validation flights over the simulated time.
@@ -303,17 +291,12 @@ fn page(
     Ok(report.page().render())
 }
 
-/// Logs for the fit and logs for validation. If none is held out, the last log is for validation. A single log is only for the
-/// fit. With `--fit-all` all logs are for both.
+/// Logs for the fit and logs for validation. With `--fit-all` all logs are for both.
 fn divided(arguments: &Arguments) -> (Vec<PathBuf>, Vec<PathBuf>) {
     let logs = &arguments.logs.paths;
-    if arguments.fit_all {
-        return (logs.clone(), logs.clone());
-    }
-    let hold_out = &arguments.hold_out;
-    match (logs.as_slice(), hold_out.as_slice()) {
-        ([first @ .., last], []) if !first.is_empty() => (first.to_vec(), vec![last.clone()]),
-        _ => (logs.to_vec(), hold_out.to_vec()),
+    match arguments.fit_all {
+        true => (logs.clone(), logs.clone()),
+        false => held_out::divided(logs, &arguments.hold_out),
     }
 }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 use super::Arguments;
 use crate::commands::files;
 use crate::logs::quoted;
+use crate::model::GreyBox;
 use crate::sysid::diagnose::{Diagnosis, Verdict};
 use crate::sysid::per_flight::askew;
 
@@ -13,14 +14,18 @@ use crate::sysid::per_flight::askew;
 /// (open-loop simulation) error on, %. The flights are those of the fit; a smaller reduction is often lost on other flights.
 const WORTH_TUNING: f64 = 10.0;
 
-/// The command to run next. `words` maps the id of an effect to the path of its effect file. `change_percent` is the change of
+/// The command to run next; empty for a `given` model with a learned residual, which `amend` refuses. `words` maps the id of an effect to the path of its effect file. `change_percent` is the change of
 /// the free-run error by tuning and by the asserted effects, % of the error of the model as given; a reduction is negative.
 pub(super) fn next(
     arguments: &Arguments,
+    given: &GreyBox,
     diagnosis: &Diagnosis,
     words: &BTreeMap<String, String>,
     change_percent: f64,
 ) -> String {
+    if given.residual.is_some() {
+        return String::new();
+    }
     let model = &arguments.model;
     let out = model.parent().unwrap_or(Path::new("")).join("amended");
     let (model, out, logs) = (quoted(model), quoted(&out), arguments.logs.words());

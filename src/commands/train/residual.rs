@@ -10,7 +10,8 @@ use comfy_table::{CellAlignment, Table};
 use crate::commands::distinct::distinct;
 use crate::commands::files::{self, shipped};
 use crate::commands::given;
-use crate::commands::intake::{Intake, LogArguments};
+use crate::commands::held_out;
+use crate::commands::intake::LogArguments;
 use crate::commands::status::IN_DOUBT;
 use crate::learn::dynamics::export;
 use crate::logs::quoted;
@@ -65,7 +66,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if arguments.out.is_dir() {
         files::writable(&arguments.out.join(export::MODEL), arguments.force.into())?;
     }
-    let (taken, tests) = arguments.flights(&model)?;
+    let (fit, held) = held_out::divided(&arguments.logs.paths, &arguments.hold_out);
+    let clock = ActuatorClock::Estimated;
+    let mut taken = arguments.logs.of(fit.clone()).take_in(&model, clock)?;
+    let tests = held_out::validation(&arguments.logs, held.clone(), (&model, clock), &mut taken)?;
     taken.notes.iter().for_each(|note| eprintln!("note: {note}"));
     let slowest = model.airframe.envelope.flying_from_mps();
     let parts = parts(&taken.flights);
@@ -96,39 +100,19 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         );
         return Ok(ExitCode::from(IN_DOUBT));
     }
-    arguments.write(&corrected, &path)?;
+    arguments.write(&corrected, &path, &fit)?;
+    let judged = if held.is_empty() { fit } else { held };
+    println!("next: {}", arguments.next(judged));
     Ok(if taken.in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
 impl Arguments {
-    /// The flights for the fit and those for validation.
-    fn flights(&self, model: &GreyBox) -> Result<(Intake, Vec<Reconstruction>)> {
-        let clock = ActuatorClock::Estimated;
-        let logs = &self.logs.paths;
-        let (fit, held) = match (logs.as_slice(), self.hold_out.as_slice()) {
-            ([first @ .., last], []) if !first.is_empty() => (first.to_vec(), vec![last.clone()]),
-            _ => (logs.clone(), self.hold_out.clone()),
-        };
-        let mut taken = self.logs.of(fit).take_in(model, clock)?;
-        if held.is_empty() {
-            let [first, last] = split(&taken.flights[0]);
-            let name = &taken.flights[0].name;
-            taken.notes.push(format!("{name}: fitted to its first two thirds, judged by the last"));
-            taken.flights = vec![first];
-            return Ok((taken, vec![last]));
-        }
-        let tests = self.logs.of(held).take_in(model, clock)?;
-        taken.notes.extend(tests.notes);
-        taken.in_doubt |= tests.in_doubt;
-        Ok((taken, tests.flights))
-    }
-
-    /// Writes the folder of the model `corrected`. `path` is the path of the model before it.
-    fn write(&self, corrected: &GreyBox, path: &Path) -> Result<()> {
+    /// Writes the folder of the model `corrected`. `path` is the path of the model before it, and `fitted` are the logs of the fit.
+    fn write(&self, corrected: &GreyBox, path: &Path, fitted: &[PathBuf]) -> Result<()> {
         std::fs::create_dir_all(&self.out)
             .with_context(|| format!("cannot make the folder {}", self.out.display()))?;
         let mut hashes = String::new();
-        for log in &self.logs.paths {
+        for log in fitted {
             let content = std::fs::read(log)
                 .with_context(|| format!("cannot read flight log {}", log.display()))?;
             hashes += &sha256(&content);
@@ -137,15 +121,14 @@ impl Arguments {
         let about = format!("{} with a linear residual fitted to flight logs.", corrected.name);
         let text = export::Text { about: &about, trained: &[] };
         export::save(corrected, path, text, &origin, &self.out)?;
-        let out = self.out.join(export::MODEL);
-        println!("model in {}", out.display());
-        let [given, out] = [&self.model, &out].map(|p| quoted(p));
-        let logs = match self.hold_out.as_slice() {
-            [] => self.logs.clone(),
-            held => self.logs.of(held.to_vec()),
-        };
-        println!("next: greylag compare --model {given} {out}{}", logs.words());
+        println!("model in {}", self.out.join(export::MODEL).display());
         Ok(())
+    }
+
+    /// The command that compares the model and its correction with the logs `judged`.
+    fn next(&self, judged: Vec<PathBuf>) -> String {
+        let [given, out] = [&self.model, &self.out.join(export::MODEL)].map(|path| quoted(path));
+        format!("greylag compare --model {given} {out}{}", self.logs.of(judged).words())
     }
 }
 

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::compare::HorizonScore;
+use crate::compare::arx::ridge_regression;
 use crate::compare::free_run::{self, error};
 use crate::per_flight::known::KnownFlight;
 use crate::weak_form::prepared::Prepared;
@@ -177,12 +178,7 @@ impl Sums {
     /// Parameters of the network, as [`Dense`] orders them: weights `[in, out]`, then biases. `None` if there is no step or a
     /// number is not finite.
     fn parameters(&self, ridge: f64) -> Option<Vec<f32>> {
-        let size = self.gram.diagonal().map(f64::sqrt);
-        let unit = size.map(|x| if x > 0.0 { 1.0 / x } else { 0.0 });
-        let scaling = DMatrix::from_diagonal(&unit);
-        let mut normal = &scaling * &self.gram * &scaling;
-        (0..REGRESSORS).for_each(|k| normal[(k, k)] += ridge);
-        let solution = &scaling * normal.cholesky()?.solve(&(&scaling * &self.moments));
+        let solution = ridge_regression(&self.gram, &self.moments, ridge)?;
         let column = |k: usize, row: usize| match k < CORRECTED_FROM {
             true => 0.0,
             false => solution[(row, k)] as f32,

@@ -366,16 +366,26 @@ impl Sums {
     /// Derivatives of the rates with respect to the regressors, for this `ridge` (see [`Choice::ridge`]). `None` if one is not
     /// finite.
     fn slopes(&self, ridge: f64) -> Option<DMatrix<f64>> {
-        let size = self.gram.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
-        let size = DMatrix::from_diagonal(&size);
-        let mut scaled = &size * &self.gram * &size;
-        for k in 0..scaled.nrows() {
-            scaled[(k, k)] += ridge;
-        }
-        let solved = scaled.svd(true, true).solve(&(&size * &self.moments), RANK).ok()?;
-        let slopes = (size * solved).transpose();
-        slopes.iter().all(|x| x.is_finite()).then_some(slopes)
+        Some(ridge_regression(&self.gram, &self.moments, ridge)?.transpose())
     }
+}
+
+/// Coefficients (rows: regressors, columns: outputs) of a least-squares fit. `gram` holds the sums of the products of two regressors,
+/// `moments` those of a regressor and an output. The number `ridge` is added to the diagonal of the normal equations after they
+/// were scaled to a unit diagonal. `None` if a coefficient is not finite.
+pub(crate) fn ridge_regression(
+    gram: &DMatrix<f64>,
+    moments: &DMatrix<f64>,
+    ridge: f64,
+) -> Option<DMatrix<f64>> {
+    let size = gram.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
+    let size = DMatrix::from_diagonal(&size);
+    let mut scaled = &size * gram * &size;
+    for k in 0..scaled.nrows() {
+        scaled[(k, k)] += ridge;
+    }
+    let solved = size.clone() * scaled.svd(true, true).solve(&(&size * moments), RANK).ok()?;
+    solved.iter().all(|x| x.is_finite()).then_some(solved)
 }
 
 #[cfg(test)]

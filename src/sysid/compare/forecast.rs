@@ -154,6 +154,7 @@ fn flown(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flight_path::ActuatorClock;
     use crate::flight_path::reconstruction::{Reconstruction, Segment};
     use greylag_logs::Sampling;
     use greylag_physics::{Controls, State};
@@ -182,6 +183,7 @@ mod tests {
             name: "f".into(),
             step_s: 0.01,
             sampling: Sampling::Held,
+            clock: ActuatorClock::AsRecorded,
             segments: vec![Segment { instants: instants.collect() }],
             nuisances: Vec::new(),
             noise: [f64::NAN; 8],

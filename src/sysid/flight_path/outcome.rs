@@ -75,9 +75,6 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     nuisances.extend(unmeasured_angles(problem, found, &segments, &left));
     let own = actuator_skew::by_axis(&segments, log.step, problem.sampling);
     let skew = actuator_skew::estimate(own, &erring, log.step, found.levels.gusts);
-    if late_beyond_doubt(&skew, log.step) {
-        notes.push(left_as_recorded(skew.late));
-    }
     nuisances.push(Nuisance {
         name: LATE.into(),
         value: skew.late,
@@ -87,10 +84,11 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     });
     let l = &found.levels;
     let m = &l.measured;
-    let flight = Reconstruction {
+    let mut flight = Reconstruction {
         name: options.name.clone(),
         step_s: log.step,
         sampling: problem.sampling,
+        clock: ActuatorClock::AsRecorded,
         segments,
         nuisances,
         noise: [m[0], m[1], m[3], l.gyro[0], l.gyro[1], l.gyro[2], m[4], m[5]],
@@ -99,6 +97,9 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
         rudder: log.rudder,
         notes,
     };
+    if let Some(skew) = flight.actuators_late() {
+        flight.notes.push(left_as_recorded(&skew));
+    }
     Ok(match options.actuators_clock {
         ActuatorClock::AsRecorded => flight,
         ActuatorClock::Estimated => flight.with_corrected_clock(),
@@ -106,35 +107,38 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
 }
 
 impl Reconstruction {
-    /// Delay of the recorded deflections against the gyros, if it is significant and they are still as recorded; else `None`.
+    /// Delay of the recorded deflections against the gyros, if it is significant and not corrected; else `None`.
     pub fn actuators_late(&self) -> Option<Skew> {
         let found = self.nuisances.iter().find(|n| n.name == LATE)?;
         let skew = Skew { late: found.value, deviation: found.sd };
-        self.notes.contains(&left_as_recorded(skew.late)).then_some(skew)
+        let left = self.clock == ActuatorClock::AsRecorded;
+        (left && late_beyond_doubt(&skew, self.step_s)).then_some(skew)
     }
 
-    /// The flight with the deflections on the time base of the gyros ([`ActuatorClock::Estimated`]): a significant delay is
-    /// removed, otherwise the flight is returned unchanged.
+    /// The flight with the deflections on the time base of the gyros ([`ActuatorClock::Estimated`]). Their delay is removed if it is
+    /// significant.
     pub fn with_corrected_clock(mut self) -> Reconstruction {
-        let Some(skew) = self.actuators_late() else { return self };
-        correct(&mut self.segments, &skew, self.step_s);
-        let note = left_as_recorded(skew.late);
-        self.notes.retain(|n| *n != note);
-        self.notes.push(format!(
-            "The recorded actuators came {:.1} ms late against the gyros and were corrected; a lag of \
-             the surfaces that the record does not show would look the same.",
-            1e3 * skew.late
-        ));
+        if let Some(skew) = self.actuators_late() {
+            correct(&mut self.segments, &skew, self.step_s);
+            let left = left_as_recorded(&skew);
+            self.notes.retain(|note| *note != left);
+            self.notes.push(format!(
+                "The recorded actuators came {:.1} ms late against the gyros and were corrected; a lag of \
+                 the surfaces that the record does not show would look the same.",
+                1e3 * skew.late
+            ));
+        }
+        self.clock = ActuatorClock::Estimated;
         self
     }
 }
 
-/// Note on deflections that are `late` (s) and not corrected.
-fn left_as_recorded(late: f64) -> String {
+/// Note on deflections whose delay `skew` is not corrected.
+fn left_as_recorded(skew: &Skew) -> String {
     format!(
         "The recorded actuators seem {:.1} ms late against the gyros, by their clock or by a lag that \
          the record does not show; they are left as recorded.",
-        1e3 * late
+        1e3 * skew.late
     )
 }
 

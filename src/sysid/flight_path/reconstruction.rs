@@ -1,5 +1,6 @@
 //! A reconstructed flight: segments with uniform time steps, sensor errors removed.
 
+use crate::flight_path::ActuatorClock;
 use greylag_logs::rudder::RudderMotion;
 use greylag_logs::{Flight, Sample, Sampling};
 use greylag_physics::sensors::Known;
@@ -68,6 +69,8 @@ pub struct Reconstruction {
     pub step_s: f64,
     /// Whether body rates and deflections are held from one sample to the next, or are samples of continuous signals.
     pub sampling: Sampling,
+    /// Time base of the deflections in `segments`.
+    pub clock: ActuatorClock,
     /// Stretches of the flight without gaps.
     pub segments: Vec<Segment>,
     /// Estimated sensor errors, wind, actuator delay and, without vanes, uncertainties of α and β.
@@ -97,6 +100,7 @@ impl Reconstruction {
             name: name.into(),
             step_s: 0.01,
             sampling: Sampling::Held,
+            clock: ActuatorClock::AsRecorded,
             segments: Vec::new(),
             nuisances: Vec::new(),
             noise: [0.0; 8],

@@ -21,8 +21,6 @@ use greylag_physics::effects::Description;
 const RUNNERS_UP: usize = 2;
 /// Half width of a 95 % interval in standard deviations.
 const INTERVAL: f64 = 1.96;
-/// 99 % quantiles of χ² with 1, 2, … degrees of freedom, for two, three, … flights. More flights are not tested.
-const CHI_SQUARED: [f64; 9] = [6.63, 9.21, 11.34, 13.28, 15.09, 16.81, 18.48, 20.09, 21.67];
 
 /// Results of all candidates: first the asserted effects, then the refused ones, then all others by rank.
 pub fn candidates(found: &Found, options: &Options) -> Vec<Candidate> {
@@ -74,29 +72,6 @@ pub fn void(found: &Found, options: &Options) -> Vec<String> {
         own.peek().is_some() && own.all(|p| p.ci95[0] < 0.0 && 0.0 < p.ci95[1])
     };
     candidates.filter(may_be_zero).map(|c| c.id).collect()
-}
-
-/// Ids of those asserted effects that mostly replace adjustments of existing coefficients, and on which the flights contradict one
-/// another. Such an effect lowers no error on held-out segments, so that only the agreement of the flights supports it.
-pub fn contradicted(found: &Found) -> Vec<String> {
-    let asserted = found.selected.iter().filter(|s| s.refused.is_empty() && s.absorbs_prior_error);
-    let of = |s: &&Selected| disagree(&of_first(found.round(), &s.by_flight));
-    asserted.filter(of).map(|s| s.id.to_owned()).collect()
-}
-
-/// Whether the scatter of the flights' estimates exceeds what their standard deviations allow (χ² test).
-fn disagree(by_flight: &[FlightEstimate]) -> bool {
-    let known: Vec<[f64; 2]> = by_flight
-        .iter()
-        .map(|f| [f.value, f.sd.powi(-2)])
-        .filter(|[value, weight]| value.is_finite() && weight.is_finite())
-        .collect();
-    let Some(limit) = known.len().checked_sub(2).and_then(|k| CHI_SQUARED.get(k)) else {
-        return false;
-    };
-    let total: f64 = known.iter().map(|[_, weight]| weight).sum();
-    let mean = known.iter().map(|[value, weight]| value * weight).sum::<f64>() / total;
-    known.iter().map(|[value, weight]| weight * (value - mean).powi(2)).sum::<f64>() > *limit
 }
 
 /// Smallest detectable amounts by effect id. An effect that was added to the model keeps the amount from the first round of the

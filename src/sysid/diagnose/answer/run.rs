@@ -42,8 +42,6 @@ const CANNOT_BE: &str =
     "a figure of these flights cannot be, so that nothing is said about forces and moments";
 /// Reason for which an effect is refused if its coefficients may be zero when all effects are estimated together.
 const MAY_BE_ZERO: &str = "its 95 % interval holds zero once all effects have settled";
-/// Reason for which an effect is refused that lowers no error on held-out segments.
-const CONTRADICTED: &str = "it mostly replaces an adjustment of existing coefficients, and the flights contradict one another on it";
 
 /// Determines which effects of the catalogue `model` lacks according to `flights`.
 ///
@@ -205,7 +203,6 @@ fn judge(
     found.refuse_where_abstained(&abstained);
     let void = ranking::void(found, options);
     found.refuse(&void, MAY_BE_ZERO);
-    found.refuse(&ranking::contradicted(found), CONTRADICTED);
     let tuned = shares::tuned(found, model);
     let doubtful = impossible(flights, &tuned);
     if !doubtful.is_empty() {

@@ -19,6 +19,8 @@ use crate::diagnose::regression::rank::{Draw, Point, Score, Trial, quadratic};
 use crate::diagnose::search::round::Round;
 use greylag_num::stream::stream;
 
+/// 99 % quantile of the standard normal distribution.
+const NORMAL_99: f64 = 2.326;
 /// Number of folds of the cross-validation over blocks.
 const FOLDS: usize = 5;
 /// Number that separates the random stream of the bootstraps from others with the same seed.
@@ -337,4 +339,23 @@ pub fn contradict(value: f64, flights: &[[f64; 2]]) -> bool {
         let off = (own - value).abs();
         other_sign || (off > 4.0 * sd && off > 0.5 * value.abs())
     })
+}
+
+/// Whether the estimates of the flights, each with its standard deviation, scatter more than chance allows: χ² test at 99 %.
+pub fn scattered(flights: &[[f64; 2]]) -> bool {
+    let known: Vec<[f64; 2]> = flights
+        .iter()
+        .map(|[own, sd]| [*own, sd.powi(-2)])
+        .filter(|[own, weight]| own.is_finite() && weight.is_finite())
+        .collect();
+    if known.len() < 2 {
+        return false;
+    }
+    let total: f64 = known.iter().map(|[_, weight]| weight).sum();
+    let mean = known.iter().map(|[own, weight]| own * weight).sum::<f64>() / total;
+    let scatter: f64 = known.iter().map(|[own, weight]| weight * (own - mean).powi(2)).sum();
+    // quantile of χ² (Wilson and Hilferty, Proceedings of the National Academy of Sciences 17, 1931)
+    let freedom = (known.len() - 1) as f64;
+    let share = 2.0 / (9.0 * freedom);
+    scatter > freedom * (1.0 - share + NORMAL_99 * share.sqrt()).powi(3)
 }

@@ -52,6 +52,7 @@ mod tests {
 
     use super::*;
     use crate::diagnose::regression::{sensors, shared};
+    use crate::flight_path::ActuatorClock;
     use crate::flight_path::reconstruction::{Instant, Reconstruction, Segment};
     use crate::per_flight::PerFlight;
     use crate::weak_form::prepared::Prepared;
@@ -91,6 +92,7 @@ mod tests {
             name: "f".into(),
             step_s: STEP_S * every as f64,
             sampling,
+            clock: ActuatorClock::AsRecorded,
             segments: vec![Segment { instants }],
             nuisances: Vec::new(),
             noise: [0.0; 8],

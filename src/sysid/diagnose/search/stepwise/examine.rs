@@ -58,7 +58,10 @@ pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
     refused.extend(hidden(found, score).filter(|_| !absorbs_prior_error));
     let by_flight = checks::by_flight(round, trial, score);
     let (first, of_first) = &by_flight[0];
-    if checks::contradict(score.values[*first], of_first) {
+    // only the agreement of the flights supports a candidate that undoes changes of coefficients
+    if checks::contradict(score.values[*first], of_first)
+        || (absorbs_prior_error && checks::scattered(of_first))
+    {
         refused.push("the flights contradict one another about its amount".into());
     }
     let contribution = round.contribution(score);
