@@ -3,7 +3,7 @@
 //! The file lists stages and axes. A stage is a command with placeholders. An axis is a quantity that is varied, such as the
 //! seed, and its values are called levels. A cell is the command of one stage with one level of each axis that it varies.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::cell::{Cell, OUT};
@@ -93,6 +93,31 @@ impl Plan {
                 self.cells.len()
             )
         })
+    }
+
+    /// Numbers of the cells that any of `choices` selects, and of all cells that these read. A choice has the form
+    /// `stage axis=level …`, as in a table of the campaign file. No choice selects all cells.
+    ///
+    /// # Errors
+    ///
+    /// If there is no such stage, axis or level, or if the stage does not vary the axis.
+    pub fn only(&self, choices: &[String]) -> Result<BTreeSet<usize>, String> {
+        if choices.is_empty() {
+            return Ok((1..=self.cells.len()).collect());
+        }
+        let mut chosen = BTreeSet::new();
+        for choice in choices {
+            let (stage, levels) = self.file.choice(choice)?;
+            let has = |cell: &&Cell| levels.iter().all(|(a, l)| cell.levels.get(a) == Some(l));
+            chosen.extend(self.of_stage(&stage).filter(has).map(|cell| cell.number));
+        }
+        // a cell reads only cells before it
+        for cell in self.cells.iter().rev() {
+            if chosen.contains(&cell.number) {
+                chosen.extend(&cell.after);
+            }
+        }
+        Ok(chosen)
     }
 
     /// The cells of a stage.
@@ -253,14 +278,15 @@ fn content(path: &Path) -> Result<String, String> {
 mod tests {
     use super::*;
 
+    fn planned(text: &str) -> Result<Plan, CampaignError> {
+        let file = CampaignFile::parse(text).unwrap();
+        plan(file, Path::new("a.toml"), &|path: &Path| PathBuf::from(path))
+    }
+
     #[test]
     fn a_stage_whose_command_leaves_out_an_axis_is_refused() {
         let text = "schema = 1\nname = \"a\"\nseeds = [1, 2]\n[axes]\nkind = [\"x\"]\n\
             [[stage]]\nname = \"first\"\nover = [\"seed\"]\ncommand = \"collect --out {out}\"\n";
-        let planned = |text: &str| {
-            let file = CampaignFile::parse(text).unwrap();
-            plan(file, Path::new("a.toml"), &|path: &Path| PathBuf::from(path))
-        };
         let why = planned(text).unwrap_err().to_string();
         assert!(why.contains("cells first/1 and first/2 have the same command"), "{why}");
         let seeded = planned(&text.replace("--out", "--seed {seed} --out")).unwrap();
@@ -272,9 +298,27 @@ mod tests {
         let text = "schema = 1\nname = \"a\"\nseeds = [1]\n[axes]\nkind = [\"x\"]\n\
             [[stage]]\nname = \"first\"\nover = [\"seed\"]\ncommand = \"collect\"\n\
             [[stage]]\nname = \"last\"\nover = [\"kind\", \"seed\"]\ncommand = \"evaluate {first:kind=x}\"\n";
-        let file = CampaignFile::parse(text).unwrap();
-        let find = |path: &Path| PathBuf::from(path);
-        let why = plan(file, Path::new("a.toml"), &find).unwrap_err().to_string();
+        let why = planned(text).unwrap_err().to_string();
         assert!(why.contains("stage first does not vary kind"), "{why}");
+    }
+
+    #[test]
+    fn a_choice_selects_cells_and_those_that_they_read() {
+        let text = "schema = 1\nname = \"a\"\nseeds = [1, 2]\n[axes]\nkind = [\"x\", \"y\"]\n\
+            [[stage]]\nname = \"first\"\nover = [\"seed\"]\ncommand = \"collect --seed {seed}\"\n\
+            [[stage]]\nname = \"last\"\nover = [\"kind\", \"seed\"]\ncommand = \"evaluate {first} {kind}\"\n";
+        let plan = planned(text).unwrap();
+        let only = |choices: &[&str]| {
+            let choices: Vec<String> = choices.iter().map(|c| (*c).to_owned()).collect();
+            let ids = |n: &usize| plan.cells[n - 1].id.clone();
+            plan.only(&choices).map(|chosen| chosen.iter().map(ids).collect::<Vec<_>>())
+        };
+        assert_eq!(only(&["last kind=y seed=2"]).unwrap(), ["first/2", "last/y/2"]);
+        assert_eq!(
+            only(&["last seed=1", "first"]).unwrap(),
+            ["first/1", "first/2", "last/x/1", "last/y/1"]
+        );
+        assert_eq!(only(&[]).unwrap().len(), 6);
+        assert!(only(&["first kind=x"]).unwrap_err().contains("does not vary kind"));
     }
 }

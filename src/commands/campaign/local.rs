@@ -1,6 +1,6 @@
-//! Runs all cells of a campaign on this machine, each in a separate process. A cell is one command line of the campaign.
+//! Runs cells of a campaign on this machine, each in a separate process. A cell is one command line of the campaign.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::OpenOptions;
 use std::path::Path;
 use std::process::{Child, Command, ExitCode, Stdio};
@@ -42,9 +42,10 @@ enum State {
     Running { kills: u32 },
     Done,
     Failed,
+    NotChosen,
 }
 
-/// A run of all cells of a campaign, at most `jobs` at a time.
+/// A run of cells of a campaign, at most `jobs` at a time.
 struct Local<'a> {
     plan: &'a Plan,
     store: &'a Store,
@@ -55,18 +56,22 @@ struct Local<'a> {
     bar: Bar,
 }
 
-/// Runs all cells that have no result, at most `jobs` at a time. Prints the final state of the cells.
+/// Runs the cells with the numbers `chosen` that have no result, at most `jobs` at a time. Prints their final state.
 pub fn run(
     plan: &Plan,
     store: &Store,
     file: &Path,
+    chosen: &BTreeSet<usize>,
     jobs: usize,
     failed: Failed,
 ) -> Result<ExitCode> {
     let logs = store.folder().join(LOGS);
     std::fs::create_dir_all(&logs).with_context(|| format!("cannot make {}", logs.display()))?;
-    let states =
-        plan.cells.iter().map(|cell| begin(store, cell, failed)).collect::<Result<Vec<_>>>()?;
+    let state = |cell: &Cell| match chosen.contains(&cell.number) {
+        true => begin(store, cell, failed),
+        false => Ok(State::NotChosen),
+    };
+    let states = plan.cells.iter().map(state).collect::<Result<Vec<_>>>()?;
     let bar = Bar::new();
     let mut local = Local { plan, store, file, jobs, states, running: BTreeMap::new(), bar };
     let interrupted = local.all();
@@ -78,7 +83,7 @@ pub fn run(
         eprintln!("interrupted; the same command goes on");
         return Ok(ExitCode::from(status::INTERRUPTED));
     }
-    ended(plan, store)
+    ended(plan, store, chosen)
 }
 
 fn begin(store: &Store, cell: &Cell, failed: Failed) -> Result<State> {
@@ -90,8 +95,10 @@ fn begin(store: &Store, cell: &Cell, failed: Failed) -> Result<State> {
 }
 
 /// Prints the final state of the cells. The exit status is 0 if all are done, 1 otherwise.
-fn ended(plan: &Plan, store: &Store) -> Result<ExitCode> {
-    let all = gather(plan, store)?;
+fn ended(plan: &Plan, store: &Store, chosen: &BTreeSet<usize>) -> Result<ExitCode> {
+    let cells = plan.cells.iter().filter(|cell| chosen.contains(&cell.number)).cloned().collect();
+    let plan = Plan { file: plan.file.clone(), cells };
+    let all = gather(&plan, store)?;
     println!(
         "{} of {} cells are done in {}",
         all.records.len(),
@@ -217,7 +224,7 @@ impl Local<'_> {
             _ => return Ok(()),
         };
         let took = self.store.times(cell)?.map_or(String::new(), |t| time(t.seconds));
-        let (done, cells) = (self.count(State::Done), self.states.len());
+        let (done, cells) = (self.count(State::Done), self.chosen());
         let left = self.left()?.map_or(String::new(), |[_, left]| format!("{} left", time(left)));
         self.bar
             .print(&format!("{done:>4}/{cells}  {:<40} {took:>7}  {left:>11}  {what}", cell.id));
@@ -241,6 +248,11 @@ impl Local<'_> {
         self.states.iter().filter(|s| **s == state).count()
     }
 
+    /// Number of cells of this run.
+    fn chosen(&self) -> usize {
+        self.states.len() - self.count(State::NotChosen)
+    }
+
     /// Two estimates, s: the processor time of all cells, and the remaining time of this run. The remaining time is the processor
     /// time of the cells that have not ended, divided by the number of jobs. `None` if the cost of a stage is unknown.
     fn left(&self) -> Result<Option<[f64; 2]>> {
@@ -248,7 +260,8 @@ impl Local<'_> {
         for stage in &self.plan.file.stages {
             let Some(cost) = Cost::of(self.plan, self.store, stage)? else { return Ok(None) };
             let indices = self.plan.of_stage(&stage.name).map(|cell| cell.number - 1);
-            for state in indices.map(|index| self.states[index]) {
+            let states = indices.map(|index| self.states[index]);
+            for state in states.filter(|state| *state != State::NotChosen) {
                 all += cost.core_seconds;
                 left += if matches!(state, State::Done | State::Failed) {
                     0.0
@@ -262,7 +275,7 @@ impl Local<'_> {
 
     /// Updates the progress bar. Returns whether Ctrl-C was pressed.
     fn show(&self) -> Result<bool> {
-        let done = self.count(State::Done) as f64 / self.states.len() as f64;
+        let done = self.count(State::Done) as f64 / self.chosen() as f64;
         let doing = format!("running campaign {}", self.plan.file.name);
         Ok(self.bar.update(Stage::new(&doing, done)).is_break())
     }

@@ -29,6 +29,9 @@ pub struct Arguments {
     /// Run the cells again that failed permanently in an earlier run.
     #[arg(long, requires = "local")]
     failed: bool,
+    /// Run only these cells and those that they read, such as `"controllers prior=true seed=1"`; may be repeated.
+    #[arg(long, value_name = "STAGE AXIS=LEVEL …", requires = "local")]
+    only: Vec<String>,
     /// Run one cell, given by its number or id; exit status 75: another attempt may succeed, 1: it failed permanently.
     #[arg(long, value_name = "ID")]
     cell: Option<String>,
@@ -76,7 +79,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = arguments.jobs.map_or(cores, usize::from);
     let again = if arguments.failed { local::Failed::Again } else { local::Failed::Leave };
-    local::run(&plan, &store, &arguments.which.file, jobs, again)
+    let chosen = plan.only(&arguments.only).map_err(anyhow::Error::msg).context("--only")?;
+    local::run(&plan, &store, &arguments.which.file, &chosen, jobs, again)
 }
 
 impl Arguments {

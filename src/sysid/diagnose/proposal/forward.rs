@@ -378,7 +378,7 @@ impl Ask<'_> {
 /// Objection to a form whose coefficient differs between flights; `None` if the flights agree.
 fn contradicted(round: &Round, trial: usize, score: &Score) -> Option<String> {
     let by_flight = checks::by_flight(round, &round.trials[trial], score);
-    checks::contradict(score.values[0], &by_flight[0].1)
+    checks::contradict(score.values[0], &by_flight[0].1, false)
         .then(|| "the flights contradict one another about its amount".into())
 }
 

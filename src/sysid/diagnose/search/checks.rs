@@ -332,17 +332,19 @@ fn less(a: &[Placed], b: &[Placed]) -> Vec<Placed> {
 /// standard deviation of each flight.
 ///
 /// An estimate contradicts `value` in two cases. It has the opposite sign and is more than three standard deviations from zero,
-/// or it differs from `value` by more than four standard deviations and by more than half of `value`.
-pub fn contradict(value: f64, flights: &[[f64; 2]]) -> bool {
-    flights.iter().any(|[own, sd]| {
+/// or it differs from `value` by more than four standard deviations and by more than half of `value`. An effect that
+/// `absorbs_prior_error` has no other support than the agreement of the flights: their scatter must not exceed chance either.
+pub fn contradict(value: f64, flights: &[[f64; 2]], absorbs_prior_error: bool) -> bool {
+    let contradicts = |[own, sd]: &[f64; 2]| {
         let other_sign = own * value < 0.0 && own.abs() > 3.0 * sd;
         let off = (own - value).abs();
         other_sign || (off > 4.0 * sd && off > 0.5 * value.abs())
-    })
+    };
+    flights.iter().any(contradicts) || (absorbs_prior_error && scattered(flights))
 }
 
 /// Whether the estimates of the flights, each with its standard deviation, scatter more than chance allows: χ² test at 99 %.
-pub fn scattered(flights: &[[f64; 2]]) -> bool {
+fn scattered(flights: &[[f64; 2]]) -> bool {
     let known: Vec<[f64; 2]> = flights
         .iter()
         .map(|[own, sd]| [*own, sd.powi(-2)])

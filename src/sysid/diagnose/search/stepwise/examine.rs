@@ -58,13 +58,9 @@ pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
     refused.extend(hidden(found, score).filter(|_| !absorbs_prior_error));
     let by_flight = checks::by_flight(round, trial, score);
     let (first, of_first) = &by_flight[0];
-    // only the agreement of the flights supports a candidate that undoes changes of coefficients
-    if checks::contradict(score.values[*first], of_first)
-        || (absorbs_prior_error && checks::scattered(of_first))
-    {
+    if checks::contradict(score.values[*first], of_first, absorbs_prior_error) {
         refused.push("the flights contradict one another about its amount".into());
     }
-    let contribution = round.contribution(score);
     let trace = match refused.is_empty() && !absorbs_prior_error {
         true => immaterial(found, round, score),
         false => None,
@@ -85,7 +81,7 @@ pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
         trace,
         absorbs_prior_error,
         curved: trial.points[score.point].contribution.is_some(),
-        contribution,
+        contribution: round.contribution(score),
     })
 }
 
