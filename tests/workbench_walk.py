@@ -181,6 +181,16 @@ def where_the_tuned_model_fails(browser, acts_in):
     return found
 
 
+def before_the_tick(browser, effect, found):
+    """Says of the asserted effect, before it is ticked, by how much the error falls; the header's line."""
+    wait(browser, "document.getElementById('ahead')?.textContent.includes('not yet added')", 300, "the error with the asserted effect")
+    wait(browser, "!document.querySelector('#job progress')", 60, "the fit with the asserted effect")
+    said = browser.value("document.getElementById('ahead').textContent")
+    if effect not in said or "tuning alone" not in said or "→" not in said:
+        found.append(f"before the tick the model's pane does not say by how much the error falls: {said}")
+    return browser.value("document.getElementById('answer').textContent")
+
+
 # Everything that a mouse can press and that is drawn.
 PRESSABLE = """
 [...document.querySelectorAll('a[href], button, input, select, textarea, summary')].filter(e => e.checkVisibility() && !e.disabled)
@@ -421,6 +431,7 @@ def walk(browser, bench, greylag, flights, folder, session):
         found.append("the curve of the first suspect is cut by its pane at 1400 x 900")
     acts_in = browser.value("document.querySelector('.suspect figcaption b').textContent.split(' ')[0]")
     found += where_the_tuned_model_fails(browser, acts_in)
+    ahead = before_the_tick(browser, effect, found)
     click(browser, ".suspect input")
     begun = time.monotonic()
     wait(browser, "document.querySelector('.bars.estimated') || document.querySelector('.bars.amended')", 60, "the estimate")
@@ -433,6 +444,8 @@ def walk(browser, bench, greylag, flights, folder, session):
     header = browser.value("document.getElementById('answer').textContent")
     if "tuned" not in header or effect not in header:
         found.append(f"the header does not tell tuning and effect apart: {header}")
+    if not header.startswith(ahead.replace(", not yet added", "")):
+        found.append(f"the tick changes what was said before it: {ahead}; then {header}")
     if "by tuning" not in browser.value("document.getElementById('box')?.textContent ?? ''"):
         found.append("the answer box is not in the model's pane")
     click(browser, "#judge")

@@ -64,7 +64,8 @@ pub struct Arguments {
     #[arg(long, value_name = "CSV")]
     predictions: Option<PathBuf>,
     /// Use the deflections at the times that the log states for them, as `diagnose` and `amend` do. Without this
-    /// option, a significant delay of the log's actuator clock is corrected.
+    /// option, a significant delay of the log's actuator clock is corrected, unless a model has an effect that explains it, such
+    /// as a lag.
     #[arg(long)]
     recorded_clock: bool,
     /// Seed of the bootstrap intervals.
@@ -86,7 +87,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         arguments.models.iter().map(|path| given::model(path)).collect::<Result<Vec<_>>>()?;
     let clock = match arguments.recorded_clock {
         true => ActuatorClock::AsRecorded,
-        false => ActuatorClock::Estimated,
+        false => {
+            let effects = models.iter().flat_map(GreyBox::effects);
+            ActuatorClock::beside(effects.map(|about| about.id))
+        }
     };
     distinct(&arguments.logs.paths, &[])?;
     let Intake { flights, mut notes, mut in_doubt } = arguments.logs.take_in(&models[0], clock)?;

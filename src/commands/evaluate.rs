@@ -112,7 +112,8 @@ pub struct Arguments {
     /// The distribution of --any, and further models whose aircraft fly the same minute.
     #[command(flatten)]
     of_any: any::AnyArguments,
-    /// Whether the controllers fly behind the envelope limiter, as in `fly` and `demo`, or bare, as in the paper.
+    /// Whether the controllers fly behind the envelope limiter (load factor, angle of attack, bank, sideslip), as in `fly` and
+    /// `demo`, or bare, as in the paper.
     #[arg(long, value_name = "WHAT", default_value = "free", value_enum)]
     envelope: EnvelopeName,
     /// Seed of the random numbers of controllers, air and draws.

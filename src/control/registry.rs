@@ -207,7 +207,7 @@ controllers! {
     Lqi "lqi" Immediate Model "Gain-scheduled LQI designed from the model." => |from| lqi::Lqi::new(from.model)?,
     LqiDamped "lqi-damped" Immediate Model "The LQI with softer loops, for a link with more delay." => |from| lqi::Lqi::weighted("lqi-damped", from.model, &lqi::Weights::DAMPED)?,
     Ilqr "ilqr" Planned Model "iLQR over half a second, together with the model's LQI: offset-free." => |from| ilqr::Ilqr::new(from.model, lqi::Lqi::new(from.model)?),
-    HybridIlqr "hybrid-ilqr" Planned ModelAndAnyPolicy "iLQR along a path inside the envelope, started from its last plan, the LQI's and the policy's: offset-free." => |from| ilqr::Ilqr::with("hybrid-ilqr", from.model, lqi::Lqi::new(from.model)?, from.agent, ilqr::Settings::HYBRID),
+    HybridIlqr "hybrid-ilqr" Planned ModelAndAnyPolicy "iLQR along a path inside the limits of load factor, angle of attack and bank, started from its last plan, the LQI's and the policy's: offset-free." => |from| ilqr::Ilqr::with("hybrid-ilqr", from.model, lqi::Lqi::new(from.model)?, from.agent, ilqr::Settings::HYBRID),
     Cem "cem" Planned Model "CEM-MPC over five steps of the model." => |from| from.planner("cem", cem::Settings::PAPER)?,
     Mppi "mppi" Planned Model "MPPI over the same five steps." => |from| from.planner("mppi", cem::Settings::MPPI)?,
     CemPolicy "cem-policy" Planned Both "CEM-MPC with the policy's proposals." => |from| from.planner("cem-policy", cem::Settings::POLICY)?,

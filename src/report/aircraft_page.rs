@@ -37,7 +37,7 @@ impl AircraftReport<'_> {
             Section::new("Three views", SKETCH_NOTE, vec![Figure::Drawing(sketch(self.model))]),
             Section::new(
                 "Straight flight",
-                "Over the envelope; angles up positive.",
+                "Over the airspeeds of the envelope; angles up positive.",
                 vec![Figure::Table(self.trim())],
             ),
             Section::new("Control response", &stick_note(), vec![Figure::Time(self.stick())]),

@@ -317,7 +317,10 @@ mod tests {
         assert_eq!(answer::best(&all).unwrap().controller, "hybrid-ilqr");
         let said = answer::sentences(&all);
         assert!(said[0].starts_with("Best: hybrid-ilqr. It keeps"), "{said:?}");
-        assert_eq!(said[2], "Behind it: lqi 0.00200°, but outside the envelope in 4 of 8.");
+        assert_eq!(
+            said[2],
+            "Behind it: lqi 0.00200°, but outside the limits of load factor or angle of attack in 4 of 8."
+        );
         // a controller that leaves the envelope in up to one flight in twenty keeps its rank
         all[0].groups.iter_mut().for_each(|s| s.kept_rate = 0.96);
         assert_eq!(answer::best(&all).unwrap().controller, "lqi");

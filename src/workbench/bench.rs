@@ -366,8 +366,8 @@ impl Inner {
         let proposal = stored(&key(Work::Proposal), &self.proposal);
         self.diagnosis = diagnosis.or(self.diagnosis.take());
         self.proposal = proposal.or(self.proposal.take());
-        for count in 1..=self.session.effects.len() {
-            let key = self.key("fit", &self.session.effects[..count]);
+        for effects in self.stacks() {
+            let key = self.key("fit", &effects);
             let folder = self.folder.join("fits").join(&key);
             if !self.fits.contains_key(&key)
                 && let Some(fitted) = Fitted::read(&folder)

@@ -71,26 +71,39 @@ struct Task {
 }
 
 impl Bench {
-    /// Computes the missing fits: one for the first accepted effect, one for the first two, and so on.
+    /// Computes the missing fits: one for the first accepted effect, one for the first two, and so on, and one for all accepted
+    /// effects with the next one.
     pub(super) fn fit(&self, progress: &Progress) -> Result<(), WorkbenchError> {
-        let count = self.lock().session.effects.len();
-        for k in 1..=count {
-            let shares = [(k - 1) as f64 / count as f64, k as f64 / count as f64];
-            let progress = part(progress, shares);
-            let task = self.task(k)?;
-            if let Some(task) = task {
-                self.one_fit(task, &progress)?;
+        let (accepted, stacks) = {
+            let inner = self.lock();
+            (inner.session.effects.len(), inner.stacks())
+        };
+        let count = stacks.len();
+        for (k, effects) in stacks.into_iter().enumerate() {
+            let shares = [k as f64 / count as f64, (k + 1) as f64 / count as f64];
+            let fitted = self.missing_fit(effects, &part(progress, shares));
+            // errors of the last fit, which nobody asked for, occur again, and are shown, when the user accepts the effect
+            if k < accepted {
+                fitted?;
             }
         }
         Ok(())
     }
 
-    /// Inputs of the fit of the first `count` effects; `None` if the fit exists, or fewer effects are accepted now.
-    fn task(&self, count: usize) -> Result<Option<Task>, WorkbenchError> {
+    /// Makes the fit with `effects` unless it exists.
+    fn missing_fit(
+        &self,
+        effects: Vec<Accepted>,
+        progress: &Progress,
+    ) -> Result<(), WorkbenchError> {
+        self.task(effects)?.map_or(Ok(()), |task| self.one_fit(task, progress))
+    }
+
+    /// Inputs of the fit with `effects`; `None` if the fit exists, or other effects are accepted now.
+    fn task(&self, effects: Vec<Accepted>) -> Result<Option<Task>, WorkbenchError> {
         let mut inner = self.lock();
-        let Some(effects) = inner.session.effects.get(..count) else { return Ok(None) };
-        let key = inner.key("fit", effects);
-        if inner.fits.contains_key(&key) {
+        let key = inner.key("fit", &effects);
+        if inner.fits.contains_key(&key) || !inner.stacks().contains(&effects) {
             return Ok(None);
         }
         // the fit may be stored from an earlier run
@@ -104,7 +117,7 @@ impl Bench {
             key,
             model: inner.model.clone(),
             original: inner.original.clone(),
-            effects: effects.to_vec(),
+            effects,
             flights: inner.divided()?,
             tuned: tuned.map(|(_, fit)| fit.clone()),
             tuned_key,

@@ -25,7 +25,7 @@ pub(super) const TRIED: &str = "tried";
 pub enum Work {
     /// Diagnosis: which effects (groups of model terms) does the model lack?
     Diagnosis,
-    /// Fit of the model with the accepted effects.
+    /// Fit of the model with the accepted effects, and with the next one that the diagnosis asserts.
     Fit,
     /// Search for a formula for the residual that no effect explains.
     Proposal,
@@ -100,10 +100,9 @@ impl Inner {
         self.jobs.retain(|job| job.work != work);
     }
 
-    /// Whether all fits exist: for each n, the fit with the first n accepted effects.
+    /// Whether all fits of [`Inner::stacks`] exist.
     fn fitted(&self) -> bool {
-        let all = &self.session.effects;
-        (1..=all.len()).all(|count| self.fits.contains_key(&self.key("fit", &all[..count])))
+        self.stacks().iter().all(|effects| self.fits.contains_key(&self.key("fit", effects)))
     }
 }
 
@@ -178,6 +177,7 @@ impl Bench {
         });
         let mut inner = self.lock();
         let job = inner.jobs.iter().position(|job| job.id == id).map(|k| inner.jobs.remove(k));
+        let diagnosed = work == Work::Diagnosis && job.is_some() && outcome.is_ok();
         if let (Some(job), Err(error)) = (job, outcome)
             && stop.answer().is_continue()
         {
@@ -185,6 +185,10 @@ impl Bench {
         }
         drop(inner);
         self.changed();
+        if diagnosed {
+            // the fit with the first asserted effect follows on its own, so that it does not delay the diagnosis
+            self.start(Work::Fit);
+        }
     }
 
     /// Records the progress of a job and sends it to the pages.

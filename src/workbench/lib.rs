@@ -4,6 +4,7 @@
 //! computer. The computations are those of the commands `compare`, `diagnose` and `amend`.
 
 mod act;
+mod ahead;
 mod bench;
 mod commands;
 mod curves;

@@ -13,7 +13,6 @@ use super::flights::Loaded;
 use super::jobs::Work;
 use super::session::{LogEntry, Occasion, Opening, Role};
 use greylag_logs::names;
-use greylag_physics::inputs::{Acts, Kind};
 use greylag_sysid::amend::split;
 use greylag_sysid::flight_path::ActuatorClock;
 use greylag_sysid::flight_path::reconstruction::Reconstruction;
@@ -151,15 +150,17 @@ impl Inner {
     /// Time base of the deflections with which models are compared. It is that of the gyros, unless an effect between recorded and
     /// acting deflections (a lag, a delay) is accepted or asserted: it, not the log's clock, then explains why they come late.
     pub fn clock(&self) -> ActuatorClock {
+        let accepted = self.session.effects.iter().map(|e| e.id.as_str());
+        ActuatorClock::beside(accepted.chain(self.asserted()))
+    }
+
+    /// Ids of the effects that the diagnosis of the present flights asserts, in the order of their selection.
+    pub fn asserted(&self) -> impl Iterator<Item = &str> {
         let key = self.key(Work::Diagnosis.word(), &[]);
         let known = self.diagnosis.as_ref().filter(|(of, _)| *of == key);
         let found = known.and_then(|(_, diagnosis)| diagnosis["effects"].as_array());
         let asserted = found.into_iter().flatten().filter(|e| e["asserted"] == true);
-        let accepted = self.session.effects.iter().map(|e| e.id.as_str());
-        match accepted.chain(asserted.filter_map(|e| e["id"].as_str())).any(delays) {
-            true => ActuatorClock::AsRecorded,
-            false => ActuatorClock::Estimated,
-        }
+        asserted.filter_map(|e| e["id"].as_str())
     }
 
     /// Divides the flights into flights for a fit and flights for its validation, as `greylag amend` does.
@@ -190,11 +191,6 @@ impl Inner {
         };
         places.iter().zip(self.names(places)).flat_map(of).collect()
     }
-}
-
-/// Whether the effect `id` can delay both surfaces.
-fn delays(id: &str) -> bool {
-    Kind::from_id(id).is_some_and(|kind| kind.acts() == Acts::OnSurfaces)
 }
 
 /// Present time, s since 1970 (UTC).

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use super::ahead::AheadView;
 use super::bench::{Bench, Inner};
 use super::commands::Commands;
 use super::curves::{FlightData, data, named};
@@ -92,6 +93,7 @@ struct StateView<'a> {
     fly: Value,
     flown: &'a [Flown],
     stack: Vec<StepView>,
+    ahead: Option<AheadView>,
     redo: Option<&'a str>,
     openings: &'a [Opening],
     jobs: &'a [Job],
@@ -169,6 +171,7 @@ impl Bench {
             fly: fly_view(&inner),
             flown: &session.flown,
             stack: (1..=session.effects.len()).map(|count| step(&inner, count)).collect(),
+            ahead: inner.ahead(),
             redo: session.undone.last().map(|e| e.id.as_str()),
             openings: &session.openings,
             jobs: &inner.jobs,

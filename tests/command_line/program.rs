@@ -72,9 +72,12 @@ fn evaluate_measures_the_way_to_targets_and_steps() {
     };
     let (said, lqi) = fly("some.json", &["--every", "70", "--group", "easy"]);
     assert!(said.lines().all(|line| line.chars().count() <= 100), "{said}");
-    for part in
-        ["integral of error, ° s", "load factor, largest", "envelope kept, %", "steps, n = 3"]
-    {
+    for part in [
+        "integral of error, ° s",
+        "load factor, largest",
+        "load factor and α kept, %",
+        "steps, n = 3",
+    ] {
         assert!(said.contains(part), "{part}: {said}");
     }
     // the 70th and the 140th target are easy

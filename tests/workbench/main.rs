@@ -3,6 +3,7 @@
 
 #[path = "../support/amend.rs"]
 mod amend_support;
+mod ahead;
 mod failsafes;
 mod own;
 mod reading;

@@ -13,7 +13,7 @@ use greylag::logs::{Flight, csv};
 use serde_json::{Value, json};
 
 /// Three logs of an aircraft whose actuators lag by 50 ms, which the model does not know.
-fn logs(folder: &Path) -> Vec<PathBuf> {
+pub fn logs(folder: &Path) -> Vec<PathBuf> {
     let log = |k: u64| {
         let name = if k < 2 { format!("flight-{k}.csv") } else { "test-2.csv".into() };
         let path = folder.join(name);
@@ -59,7 +59,7 @@ fn commands_are_understood(state: &Value, model: &Path, shown: &[&str]) {
 }
 
 /// The error at 5 s.
-fn at_5_s(scores: &Value) -> f64 {
+pub fn at_5_s(scores: &Value) -> f64 {
     let five = scores.as_array().unwrap().iter().find(|s| s["horizon_s"] == 5.0);
     five.unwrap()["rmse_scaled"].as_f64().unwrap()
 }

@@ -7,6 +7,7 @@ use super::Arguments;
 use crate::commands::files;
 use crate::logs::quoted;
 use crate::model::GreyBox;
+use crate::sysid::compare::Answer;
 use crate::sysid::diagnose::{Diagnosis, Verdict};
 use crate::sysid::per_flight::askew;
 
@@ -14,14 +15,14 @@ use crate::sysid::per_flight::askew;
 /// (open-loop simulation) error on, %. The flights are those of the fit; a smaller reduction is often lost on other flights.
 const WORTH_TUNING: f64 = 10.0;
 
-/// The command to run next; empty for a `given` model with a learned residual, which `amend` refuses. `words` maps the id of an effect to the path of its effect file. `change_percent` is the change of
-/// the free-run error by tuning and by the asserted effects, % of the error of the model as given; a reduction is negative.
+/// The command to run next; empty for a `given` model with a learned residual, which `amend` refuses. `words` maps the id of an
+/// effect to the path of its effect file. `answer` has the free-run errors as given, tuned, and with the asserted effects.
 pub(super) fn next(
     arguments: &Arguments,
     given: &GreyBox,
     diagnosis: &Diagnosis,
     words: &BTreeMap<String, String>,
-    change_percent: f64,
+    answer: &Answer,
 ) -> String {
     if given.residual.is_some() {
         return String::new();
@@ -39,7 +40,11 @@ pub(super) fn next(
             let added = added(&found.collect::<Vec<_>>(), words, written);
             format!("greylag amend --model {model}{logs} {added} --out {out}")
         }
-        (Verdict::Adequate, _) if change_percent > -WORTH_TUNING => {
+        // what a model needs that is worse than straight flight is other coefficients, before any effect
+        (Verdict::Adequate | Verdict::Unexplained, _) if answer.behind_baseline() => {
+            scratch(&model, &logs, &out)
+        }
+        (Verdict::Adequate, _) if answer.numbers.change_percent > -WORTH_TUNING => {
             format!("greylag aircraft check --model {model}")
         }
         (Verdict::Adequate, _) => {
@@ -79,6 +84,12 @@ fn turned(model: &str, logs: &str, out: &str) -> String {
     format!("greylag amend --model {model}{logs} --tune-only --axes-askew 3 --out {out}")
 }
 
+/// The command that fits all coefficients without the values of the model file. It is recommended if a forecast without
+/// aerodynamics is better than the model, and tuning the model within its prior does not change that.
+fn scratch(model: &str, logs: &str, out: &str) -> String {
+    format!("greylag amend --model {model}{logs} --tune-only --from-scratch --out {out}")
+}
+
 /// Whether an asserted effect cannot be distinguished from another explanation with these flights. An effect is asserted if
 /// the diagnosis states that the model lacks it.
 fn in_doubt(diagnosis: &Diagnosis) -> bool {
@@ -112,8 +123,9 @@ mod tests {
             assert!(line.ends_with(&format!(" --between lift_stall {named}")), "{line}");
             assert!(matches!(command_of(&words(&line)), Ok(Command::Design(_))), "{line}");
         }
-        let line = turned("model.toml", " --log a.csv", "amended");
-        assert!(matches!(command_of(&words(&line)), Ok(Command::Amend(_))), "{line}");
+        for line in [turned, scratch].map(|of| of("model.toml", " --log a.csv", "amended")) {
+            assert!(matches!(command_of(&words(&line)), Ok(Command::Amend(_))), "{line}");
+        }
         let json = Some(Path::new("found.json"));
         for (found, written, option) in [
             (&["lift_stall"][..], None, "--effect lift_stall"),

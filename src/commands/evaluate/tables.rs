@@ -43,9 +43,7 @@ pub(super) fn print(evaluations: &[Evaluation]) {
     println!(
         "all: easy with hard_corners, the targets of the paper's Table II; its means: Table XI"
     );
-    println!(
-        "envelope kept: load factor and angle of attack, 5 % beyond the airframe file's limits at most"
-    );
+    println!("load factor and α kept: at most 5 % beyond the limits of the airframe file");
     // printed last, because a user sees the end of the output first
     println!();
     evaluation_answer(evaluations).iter().for_each(|sentence| println!("{}", broken(sentence)));
@@ -85,7 +83,7 @@ fn table(group: &str, evaluations: &[Evaluation], name: &dyn Fn(&Evaluation) -> 
         if share.is_finite() { format!("{:.1}", 100.0 * share) } else { "–".into() }
     };
     push("overshoot ≤ 1° or 3 %, %", &|_, s| percent(s.little_overshoot_rate));
-    push("envelope kept, %", &|_, s| percent(s.kept_rate));
+    push("load factor and α kept, %", &|_, s| percent(s.kept_rate));
     push("settled error, °, mean", &|_, s| {
         format!("{} {}", number(s.mean_deg), interval(s.mean_ci95_deg))
     });
@@ -165,7 +163,9 @@ mod tests {
         assert_eq!(tables.len(), 8);
         let text = tables.iter().map(Table::to_string).collect::<Vec<_>>().join("\n");
         assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
-        for part in ["hybrid-lqi", "integral of error", "envelope kept", "3600", "hard_outside"] {
+        for part in
+            ["hybrid-lqi", "integral of error", "load factor and α kept", "3600", "hard_outside"]
+        {
             assert!(text.contains(part), "{part}: {text}");
         }
     }

@@ -96,7 +96,7 @@ measures! {
         "Share of the ticks at which a surface command is at −1 or 1.";
     throttle_saturated, "throttle at a stop", "share", More, |q| q.saturated.throttle,
         "Share of the ticks at which the throttle command is 0 or 1.";
-    outside_s, "outside the envelope", "s", More, |q| q.outside_s.any,
+    outside_s, "outside any limit", "s", More, |q| q.outside_s.any,
         "Time outside any limit of the airframe file: bank, pitch, load factor, stall, sideslip, airspeed, surface rate.";
     outside_load_factor_s, "outside the load factor", "s", More,
         |q| q.outside_s.load_factor + q.outside_s.load_factor_low,

@@ -28,10 +28,9 @@ pub fn diagnosis_page(report: &DiagnosisReport) -> Page {
     let words = || Figure::Findings(findings(d));
     let (first, later) = match answer {
         Some(answer) => {
-            let first = match d.effects.iter().any(|c| c.asserted) {
-                true => First::Error,
-                false => First::Effect,
-            };
+            // that a forecast without aerodynamics is better than the model comes before what the model lacks
+            let error_first = answer.behind_baseline() || d.effects.iter().any(|c| c.asserted);
+            let first = if error_first { First::Error } else { First::Effect };
             let answer = AnswerBox { answer, place: place::of_diagnosis(d), first };
             let answer = Figure::Answer(Box::new(answer));
             (answer, Section::new("In words", "", vec![words()]))

@@ -4,8 +4,9 @@ use super::label;
 use crate::kit::numbers::{attitude, number};
 use greylag_sim::evaluation::{Evaluation, Score};
 
-/// The limits that count as the envelope here.
+/// The limits that count as the envelope here, of a controller that keeps them and of one that does not.
 const KEEPS: &str = "keeps its limits of load factor and angle of attack";
+const LEAVES: &str = "outside the limits of load factor or angle of attack";
 /// Group of targets over which controllers are ranked if the evaluation contains it.
 const ALL: &str = "all";
 /// A controller ranks behind the others if its fraction of flights that keep the envelope is more than this below the largest
@@ -127,7 +128,7 @@ fn followers(
         let one = |ranked: &Ranked| {
             let Some(left @ 1..) = outside(ranked.1) else { return error(ranked) };
             let but = if ranked.1.mean_deg < score.mean_deg { "but " } else { "" };
-            let of = if std::mem::take(&mut first) { "outside the envelope" } else { "outside" };
+            let of = if std::mem::take(&mut first) { LEAVES } else { "outside" };
             format!("{}, {but}{of} in {left} of {}", error(ranked), ranked.1.count)
         };
         let behind: Vec<String> = behind.into_iter().map(one).collect();

@@ -9,6 +9,8 @@ use greylag_control::quality::{MEASURES, Measure};
 use greylag_sim::evaluation::{Evaluation, Score};
 use greylag_sim::summary::Spread;
 
+/// Name of the share of flights that keep the limits of load factor and angle of attack.
+const KEPT: &str = "Load factor and angle of attack kept";
 /// Number of distinct colours. Further controllers repeat the colours with wider lines.
 const COLOURS: usize = 4;
 
@@ -79,7 +81,7 @@ fn measures(report: &EvaluationReport) -> Section {
         let mut table = Table::new("Measures", &columns);
         let kept = |score: &Score| format!("{} %", number(100.0 * score.kept_rate));
         let little = |score: &Score| format!("{} %", number(100.0 * score.little_overshoot_rate));
-        push(&mut table, "Envelope kept".into(), &scored, &kept);
+        push(&mut table, KEPT.into(), &scored, &kept);
         for m in MEASURES.iter().filter(|m| moves(&scored, m)) {
             push(&mut table, titled(m), &scored, &|score| cell(score, m));
             if m.id == "overshoot_pitch_deg" {
@@ -89,9 +91,9 @@ fn measures(report: &EvaluationReport) -> Section {
         Figure::Table(table)
     };
     let mut definitions = Table::new("Definitions", &[("Measure", Left), ("Definition", Left)]);
-    let envelope = "Share of the flights whose load factor and angle of attack pass the airframe file's limits by at most \
+    let within = "Share of the flights whose load factor and angle of attack pass the airframe file's limits by at most \
                     5 % (a transient).";
-    definitions.push(["Envelope kept".into(), envelope.into()]);
+    definitions.push([KEPT.into(), within.into()]);
     MEASURES.iter().for_each(|m| definitions.push([titled(m), m.definition.into()]));
     let figures = vec![by_group(report, "measures", &figure), Figure::Table(definitions)];
     let note = format!(

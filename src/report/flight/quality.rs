@@ -85,10 +85,11 @@ pub(crate) fn kept(samples: &[Sample], envelope: &EnvelopeFlown) -> Kept {
     all
 }
 
-/// Part of a sentence that states the time outside the envelope, the load factors and the largest angle of attack.
+/// Part of a sentence that states the time outside the limits, the load factors and the largest angle of attack.
 pub(super) fn clause(kept: &Kept, limits: &Limits) -> String {
     if !kept.judged {
-        return "the envelope was not judged: no sample counts as flight".into();
+        return "the limits of the airframe file were not judged: no sample counts as flight"
+            .into();
     }
     format!("{}: {}", outside(kept), loads(kept, limits))
 }
@@ -122,16 +123,16 @@ pub(super) fn left(kept: &Kept) -> bool {
     kept.judged && (!kept.kept || attitude_or_speed.iter().any(|seconds| *seconds > 0.0))
 }
 
-/// Phrase with the time outside the envelope, in total and for each limit.
+/// Phrase with the time outside the limits of the airframe file, in total and for each limit.
 pub(super) fn outside(kept: &Kept) -> String {
     let seconds = kept.outside_s.any;
     if seconds <= 0.0 {
-        return "inside the envelope".to_owned();
+        return "inside every limit of the airframe file".to_owned();
     }
     let passed = kept.outside_s.passed();
     let names: Vec<String> =
         passed.iter().map(|(name, s)| format!("{name} {} s", number(*s))).collect();
-    format!("outside the envelope for {} s ({})", number(seconds), names.join(", "))
+    format!("outside limits for {} s ({})", number(seconds), names.join(", "))
 }
 
 /// The largest value of the measure `of` over the segments; NaN if there is none.
@@ -213,8 +214,8 @@ mod tests {
             let samples = [at(0.0), at(0.01), at(0.02)];
             clause(&kept(&samples, &EnvelopeFlown { limits, flying_from_mps: 8.0 }), &limits)
         };
-        assert!(said(3.0).starts_with("the envelope was not judged"), "{}", said(3.0));
-        assert!(said(20.0).starts_with("inside the envelope"), "{}", said(20.0));
+        assert!(said(3.0).starts_with("the limits of the airframe file were not judged"));
+        assert!(said(20.0).starts_with("inside every limit of the airframe file: "));
         assert!(said(20.0).contains(" (limits −1.00 to 2.20), "), "{}", said(20.0));
     }
 }

@@ -100,8 +100,8 @@ pub(crate) fn verdict(report: &FlightReport) -> Verdict {
     Verdict { outcome, reason, sentence, details, before_next, next }
 }
 
-/// The outcome of a flight. `kept` states whether the aircraft kept to the envelope, and `late` the number of late cycles; `None`
-/// if they are unknown.
+/// The outcome of a flight. `kept` states whether load factor and angle of attack kept their limits, and `late` the number of late
+/// cycles; `None` if they are unknown.
 fn outcome(report: &FlightReport, kept: Option<bool>, late: Option<usize>) -> Outcome {
     let (tracked, all) = (report.tracked(), report.segments.len());
     match (all, late) {
@@ -124,7 +124,7 @@ fn reason(not_tracked: usize, late: Option<usize>, kept: Option<bool>) -> String
         all.push(plural(not_tracked, "target") + " not tracked");
     }
     if kept == Some(false) {
-        all.push("envelope left".into());
+        all.push("load factor or angle of attack beyond its limit".into());
     }
     if let Some(late @ 1..) = late {
         all.push(plural(late, "cycle") + " of the loop late");
@@ -201,8 +201,8 @@ fn details(report: &FlightReport) -> Vec<String> {
     }
     if report.envelope.is_some() {
         details.push(format!(
-            "The envelope counts as kept when load factor and angle of attack pass their limits by at most {} %; times outside \
-             the limits of bank, pitch and airspeed are stated beside it.",
+            "The outcome counts the limits of load factor and angle of attack, which may be passed by {} %; times outside the \
+             limits of bank, pitch, sideslip and airspeed are stated beside it.",
             100.0 * TRANSIENT
         ));
     }

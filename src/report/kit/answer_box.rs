@@ -53,11 +53,13 @@ impl AnswerBox {
         )
     }
 
-    /// CSS class for the colour of the box. It is empty if the sentence on the error comes first and the error falls.
+    /// CSS class for the colour of the box. It is empty if the sentence on the error comes first and the error falls, unless a
+    /// forecast without aerodynamics is still better.
     fn tone(&self) -> &'static str {
         let change = self.answer.numbers.change_percent;
         match self.first {
             First::Effect => " open",
+            First::Error if self.answer.behind_baseline() => " missed",
             First::Error if change < 0.0 => "",
             First::Error if change > 0.0 => " missed",
             First::Error => " open",

@@ -12,7 +12,7 @@ use super::error::AmendError;
 use super::quick::estimate;
 use super::result::{Amendment, Parameter};
 use crate::compare::answer::{Answer, Decisive, Seen, Stage, Subject, Way};
-use crate::compare::{Comparison, HorizonScore, scores};
+use crate::compare::{Comparison, HorizonScore, forecast, scores};
 use crate::diagnose::{Candidate, Diagnosis, Parameter as Estimate};
 use crate::flight_path::reconstruction::{Instant, Reconstruction};
 use greylag_model::GreyBox;
@@ -82,7 +82,8 @@ pub struct Diagnosed {
 }
 
 /// Computes how much tuning and the asserted effects of `diagnosis` reduce the free-run error of `model` on `flights`, the
-/// flights of the diagnosis.
+/// flights of the diagnosis. The baseline of the answer is the better of the forecasts that are not fitted: the held state, and
+/// straight flight.
 ///
 /// # Errors
 /// If an effect cannot be added to the model, or a flight cannot be resampled.
@@ -93,7 +94,9 @@ pub fn diagnosed(
 ) -> Result<Diagnosed, AmendError> {
     let asserted: Vec<_> = diagnosis.effects.iter().filter(|c| c.asserted).collect();
     let added: Vec<Added> = asserted.iter().map(|c| Added::of(c)).collect();
-    let given = scores(model, flights, &Options::default().horizons_s)?;
+    let horizons_s = Options::default().horizons_s;
+    let given = scores(model, flights, &horizons_s)?;
+    let unfitted = forecast::unfitted(model, flights, &horizons_s)?;
     let tuned = estimate(model, flights, flights, &[])?;
     let stage = |way, scores| Stage { way, model: &diagnosis.model, scores };
     let mut stages = vec![stage(Way::Given, &given[..]), stage(Way::Tuned, &tuned.after[..])];
@@ -102,31 +105,33 @@ pub fn diagnosed(
         false => Some(estimate(model, flights, flights, &added)?.after),
     };
     stages.extend(after.as_ref().map(|scores| stage(Way::Effects, &scores[..])));
-    let clearest = |c: &&Candidate| {
-        let clear = |p: &&Estimate| Decisive::clearness(p.value, p.ci95);
-        let p = c.parameters.iter().max_by(|a, b| clear(a).total_cmp(&clear(b)))?;
-        Some(Decisive {
-            id: c.id.clone(),
-            description: c.description.into(),
-            coefficient: p.name.clone(),
-            value: p.value,
-            ci95: p.ci95,
-            unit: unit(&c.id, &p.name).into(),
-            alike: c.indistinguishable_from.clone(),
-        })
-    };
     let answer = Answer::of(&Subject {
         stages,
         flights: flights.iter().map(|f| f.name.clone()).collect(),
         seen: Seen::Of(flights.len()),
-        effects: asserted.iter().filter_map(clearest).collect(),
-        baseline: None,
+        effects: asserted.iter().filter_map(|c| clearest(c)).collect(),
+        baseline: forecast::best(&unfitted).map(|f| (f.name, &f.free_run[..])),
     });
     let said = diagnosis.sentences.first().filter(|_| asserted.is_empty());
     let answer = said.map_or(answer.clone(), |said| answer.with_effect(said.clone()));
     let mut tuned = tuned.model;
     tuned.name = "tuned".into();
     Ok(Diagnosed { tuned, answer })
+}
+
+/// The effect `c` with its coefficient that is most significantly different from zero; `None` if it has no coefficient.
+fn clearest(c: &Candidate) -> Option<Decisive> {
+    let clear = |p: &&Estimate| Decisive::clearness(p.value, p.ci95);
+    let p = c.parameters.iter().max_by(|a, b| clear(a).total_cmp(&clear(b)))?;
+    Some(Decisive {
+        id: c.id.clone(),
+        description: c.description.into(),
+        coefficient: p.name.clone(),
+        value: p.value,
+        ci95: p.ci95,
+        unit: unit(&c.id, &p.name).into(),
+        alike: c.indistinguishable_from.clone(),
+    })
 }
 
 /// Estimate of a coefficient, from a fit or from the file `amend.json`.

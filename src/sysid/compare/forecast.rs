@@ -3,11 +3,13 @@
 
 use serde::Serialize;
 
+use super::answer::ANSWER_S;
 use super::arx::{self, Arx};
 use super::free_run::{DIVERGENCE_BOUND, Look, Runs, START_EVERY_S, error, scaled};
 use super::result::HorizonScore;
-use crate::flight_path::reconstruction::Instant;
-use crate::weak_form::prepared::Prepared;
+use crate::flight_path::reconstruction::{Instant, Reconstruction};
+use crate::weak_form::prepared::{ClockError, Prepared};
+use greylag_model::GreyBox;
 
 /// Errors of a baseline forecast. Its runs start at the same times as the free runs of the models.
 #[derive(Clone, Debug, Serialize)]
@@ -109,6 +111,38 @@ pub fn on_unseen(
     results(all, flights, scale, horizons)
 }
 
+/// Errors on `flights` of the forecasts that are not fitted: the state is held, or the flight goes straight on. The horizons are
+/// `horizons_s` (s). The errors of the states are divided by their scales in `model`.
+///
+/// # Errors
+/// The sampling interval of a flight is not usable: see `ClockError`.
+pub fn unfitted(
+    model: &GreyBox,
+    flights: &[Reconstruction],
+    horizons_s: &[f64],
+) -> Result<Vec<ForecastResult>, ClockError> {
+    let slowest = model.airframe.envelope.flying_from_mps();
+    let prepared =
+        flights.iter().map(|f| Prepared::new(f, slowest)).collect::<Result<Vec<_>, _>>()?;
+    let all = [Forecast::Hold, Forecast::Straight].into_iter();
+    Ok(results(all, &prepared, model.scale(), horizons_s))
+}
+
+/// The forecast with the smallest error at the horizon of an answer: the longest horizon up to [`ANSWER_S`] that any run reaches
+/// or, without one, the shortest horizon that is reached. `None` without forecasts.
+pub fn best(forecasts: &[ForecastResult]) -> Option<&ForecastResult> {
+    let error = |f: &ForecastResult| {
+        let reached = || f.free_run.iter().filter(|s| s.runs > 0);
+        let longest = reached()
+            .filter(|s| s.horizon_s <= ANSWER_S + 1e-9)
+            .max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s));
+        let score =
+            longest.or_else(|| reached().min_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s)));
+        score.map_or(f64::INFINITY, |s| s.rmse_scaled)
+    };
+    forecasts.iter().min_by(|a, b| error(a).total_cmp(&error(b)))
+}
+
 fn results(
     all: impl Iterator<Item = Forecast>,
     flights: &[Prepared],
@@ -155,7 +189,7 @@ fn flown(
 mod tests {
     use super::*;
     use crate::flight_path::ActuatorClock;
-    use crate::flight_path::reconstruction::{Reconstruction, Segment};
+    use crate::flight_path::reconstruction::Segment;
     use greylag_logs::Sampling;
     use greylag_physics::{Controls, State};
 

@@ -39,6 +39,7 @@ use greylag_logs::{Flight, Sampling};
 use greylag_model::GreyBox;
 use greylag_physics::Sensors;
 use greylag_physics::airframe::ActuatorFigures;
+use greylag_physics::inputs::{Acts, Kind};
 
 /// Time base of the reconstructed deflections.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,6 +50,20 @@ pub enum ActuatorClock {
     /// The time base of the log: deflections stay as recorded. A later search for missing effects can then separate errors of
     /// the time base from physical delays. The delay `skew_actuators` is estimated for information only.
     AsRecorded,
+}
+
+impl ActuatorClock {
+    /// Time base for free runs (open-loop simulations) of a model that has, or lacks, the effects `ids`. It is that of the gyros,
+    /// unless one of the effects can delay both surfaces (a lag, a delay): it, not the log's clock, then explains why the recorded
+    /// deflections come late.
+    pub fn beside<'a>(mut ids: impl Iterator<Item = &'a str>) -> ActuatorClock {
+        let delays =
+            |id: &str| Kind::from_id(id).is_some_and(|kind| kind.acts() == Acts::OnSurfaces);
+        match ids.any(delays) {
+            true => ActuatorClock::AsRecorded,
+            false => ActuatorClock::Estimated,
+        }
+    }
 }
 
 /// Options of a reconstruction.
@@ -190,4 +205,17 @@ pub fn reconstruct(
     let mut outcome = outcome::assemble(&Problem { sampling, widths, ..problem }, &found)?;
     outcome.notes.extend(note);
     Ok(outcome)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lag_of_the_surfaces_explains_late_deflections_and_a_lag_of_the_thrust_does_not() {
+        let clock = |ids: &[&str]| ActuatorClock::beside(ids.iter().copied());
+        assert_eq!(clock(&["drag_beta2", "actuator_lag"]), ActuatorClock::AsRecorded);
+        assert_eq!(clock(&["drag_beta2", "thrust_lag"]), ActuatorClock::Estimated);
+        assert_eq!(clock(&[]), ActuatorClock::Estimated);
+    }
 }

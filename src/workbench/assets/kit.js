@@ -71,6 +71,19 @@ export const judged = (scores) => reached(scores)?.rmse_scaled ?? null;
 export const horizon = (scores) => (reached(scores) ? ` at ${show(reached(scores).horizon_s, 1)} s` : "");
 /** Result of the fit with the most accepted effects. It is the valid one for all effects. */
 export const verdicts = (state) => [...state.stack].reverse().find((s) => s.story)?.story ?? null;
+/** Ids of the effects that a fit added to the model. */
+export const joined = (story) => (story?.effects ?? []).filter((e) => e.joined).map((e) => e.id);
+/** Result of the fit with the next asserted effect, which is not accepted yet; null if there is none, or if the fit refuses the effect. */
+export const ahead = (state) => (joined(state.ahead?.story).includes(state.ahead?.id) ? state.ahead.story : null);
+/** Errors (NRMSE) on the flights held out, each with its word: as given, tuned, with the accepted effects, with the next asserted effect. */
+export function steps(state) {
+  const [accepted, next] = [verdicts(state), ahead(state)];
+  const first = accepted ?? next;
+  if (!first) return [];
+  const ids = joined(accepted);
+  return [["as given", judged(first.given)], ["tuned", judged(first.before)], ids.length && [ids.join(" + "), judged(accepted.after)],
+    next && [`${state.ahead.id}, not yet added`, judged(next.after)]].filter(Boolean);
+}
 
 /** The equivalent command, with a button that copies it. */
 export function command(text, what = "The same") {

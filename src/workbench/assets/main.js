@@ -1,6 +1,6 @@
 // The workbench page: a session in several panes, which show the state of the program.
 
-import { complain, el, get, horizon, hush, judged, percent, post, redraw, send, show, verdicts } from "./kit.js";
+import { ahead, complain, el, get, horizon, hush, percent, post, redraw, send, show, steps, verdicts } from "./kit.js";
 import { flights } from "./flights.js";
 import { failing, follow, freshFailing, repaint } from "./failing.js";
 import { fly, offer, part } from "./fly.js";
@@ -113,18 +113,17 @@ function show_middle(pane, schedule) {
 }
 for (const name of ["failing", "fly"]) document.getElementById(`show-${name}`).addEventListener("click", () => show_middle(name));
 
-/** Shows the session's answer in one line: the error before and after the effects. */
+/** Shows the session's answer in one line: the error before and after the effects, the next asserted one included. */
 function answer() {
   const { state } = bench;
   const place = document.getElementById("answer");
-  const story = verdicts(state);
+  const story = verdicts(state) ?? ahead(state);
   const name = el("b", {}, state.model.name);
   if (!story) return place.replaceChildren(name);
   // the reductions of the error by tuning and by the effects are shown separately
-  const joined = story.effects.filter((e) => e.joined).map((e) => e.id);
-  const steps = [["as given", judged(story.given)], ["tuned", judged(story.before)], ...(joined.length ? [[joined.join(" + "), judged(story.after)]] : [])];
-  const parts = steps.flatMap(([word, error], k) => {
-    const before = k && steps[k - 1][1];
+  const all = steps(state);
+  const parts = all.flatMap(([word, error], k) => {
+    const before = k && all[k - 1][1];
     const fall = before && error != null ? `, ${percent(error / before - 1)}` : "";
     return [k ? " → " : "", el("b", {}, show(error)), ` (${word}${fall})`];
   });

@@ -1,6 +1,6 @@
 // The model pane: the accepted effects, the error after each of them, and buttons to judge, undo and save.
 
-import { command, el, horizon, judged, show, verdicts } from "./kit.js";
+import { ahead, command, el, horizon, joined, judged, percent, show, steps, verdicts } from "./kit.js";
 
 export function model(bench) {
   const body = document.querySelector("#model .body");
@@ -20,13 +20,30 @@ export function model(bench) {
     el("button", { type: "button", id: "judge", disabled: !tests.length || !stack.length || unfitted || state.jobs.length > 0, title: stack.length ? "Opens the test flights; each opening is counted and recorded" : "Accept an effect first: each opening of the test flights is counted and recorded", onclick: () => bench.act({ do: "judge" }) }, "Judge"),
     el("button", { type: "button", id: "save", class: stack.length && !unfitted ? "main" : "", disabled: !stack.length || unfitted || state.jobs.length > 0, onclick: () => save(bench) }, "Save"),
     el("button", { type: "button", id: "fly-it", onclick: () => bench.show("fly") }, "Fly it"));
-  body.replaceChildren(...[outside, base, box(state), errors(state), ...stack.map((s) => step(bench, s)), !stack.length && el("p", { class: "empty" }, nothing(bench.diagnosis)),
+  body.replaceChildren(...[outside, base, box(state), errors(state), ...stack.map((s) => step(bench, s)), next(state) ?? (!stack.length && el("p", { class: "empty" }, nothing(bench.diagnosis))),
     buttons, saved.note, opened(state), command(state.commands.amend, "Model and Save"), command(state.commands.judge, "Judge")].filter(Boolean));
 }
 
 /** Text in place of the accepted effects. */
 function nothing(diagnosis) {
   return diagnosis && !diagnosis.effects.some((e) => e.asserted) ? "No suspect is strong enough to accept." : "No effect is accepted yet: tick a suspect to see by how much the error falls.";
+}
+
+/** By how much the error falls with the next asserted effect, before the user accepts it; null if the diagnosis asserts no further effect,
+ *  or if the fit with it is neither made nor running. */
+function next(state) {
+  const { id, status, story } = state.ahead ?? {};
+  if (status === "fitting") return el("p", { class: "empty", id: "ahead" }, `By how much the error falls with ${id} is being computed …`);
+  if (status !== "fitted") return null;
+  if (!ahead(state)) {
+    const why = story.effects.find((e) => e.id === id)?.refused ?? [];
+    return el("p", { class: "empty", id: "ahead" }, `The fit refuses ${id} (not yet added): ${why.join("; ")}.`);
+  }
+  const all = steps(state);
+  const [[, from], [, to]] = all.slice(-2);
+  const fall = (a, b) => `${show(a)} → ${show(b)} (${percent(b / a - 1)})`;
+  const tuning = all.length === 3 && `tuning alone ${fall(all[0][1], all[1][1])}; `;
+  return el("p", { id: "ahead" }, `Error${horizon(story.after)} held out: ${tuning || ""}with ${id} (not yet added) ${fall(from, to)}. Tick it to add it.`);
 }
 
 /** The answer in the words of the command `amend`. */
@@ -62,9 +79,8 @@ function errors(state) {
   }
   if (!rows.length) return null;
   const last = state.openings.filter((o) => o.occasion === "judged").pop();
-  const joined = (story?.effects ?? []).filter((e) => e.joined).map((e) => e.id);
   // the last row is the amended model if its fit is complete
-  const about = last && state.stack.every((s) => s.story) && last.effects.join() === joined.join();
+  const about = last && state.stack.every((s) => s.story) && last.effects.join() === joined(story).join();
   const test = (k) => (last && k === 0 ? last.given : about && k === rows.length - 1 ? last.amended : null);
   const all = rows.map((r, k) => [...r, test(k)]);
   const most = Math.max(...all.flatMap((r) => r.slice(2)).filter((v) => v != null));

@@ -1,8 +1,8 @@
 //! Summary of a comparison of models. It states the error of the first model in free runs (simulations from recorded states), and
 //! the errors of the other models relative to it.
 
-use super::{ANSWER_S, Answer, Seen, Stage, Subject, Way};
-use crate::compare::forecast::ForecastResult;
+use super::{Answer, Seen, Stage, Subject, Way};
+use crate::compare::forecast::{ForecastResult, best};
 use crate::compare::result::ModelResult;
 use crate::weak_form::prepared::Prepared;
 
@@ -18,23 +18,12 @@ pub fn between(
         model: &model.name,
         scores: &model.free_run,
     });
-    // error at the longest horizon up to ANSWER_S that any run reaches or, without one, at the shortest reached horizon
-    let error = |f: &ForecastResult| {
-        let reached = || f.free_run.iter().filter(|s| s.runs > 0);
-        let longest = reached()
-            .filter(|s| s.horizon_s <= ANSWER_S + 1e-9)
-            .max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s));
-        let score =
-            longest.or_else(|| reached().min_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s)));
-        score.map_or(f64::INFINITY, |s| s.rmse_scaled)
-    };
-    let best = forecasts.iter().min_by(|a, b| error(a).total_cmp(&error(b)));
     Answer::of(&Subject {
         stages: stages.collect(),
         flights: flights.iter().map(|f| f.name.clone()).collect(),
         seen: Seen::Unknown,
         effects: Vec::new(),
-        baseline: best.map(|f| (f.name, &f.free_run[..])),
+        baseline: best(forecasts).map(|f| (f.name, &f.free_run[..])),
     })
 }
 

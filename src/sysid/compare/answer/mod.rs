@@ -114,6 +114,11 @@ impl Answer {
             .filter(|l| !l.is_empty())
     }
 
+    /// Whether a forecast without aerodynamics errs less than the given model and than every model that was fitted from it.
+    pub fn behind_baseline(&self) -> bool {
+        self.numbers.all_behind()
+    }
+
     /// The answer as a short phrase: `error at 5 s 0.0873 → 0.00083 (−99.0 %)`.
     pub fn summary(&self) -> String {
         words::summary(&self.numbers)
@@ -245,6 +250,43 @@ mod tests {
             fitted.error,
             "Keep the model as it is: its error at 5 s is 0.02; tuning it to these flights makes it 0.04."
         );
+    }
+
+    #[test]
+    fn a_model_worse_than_straight_flight_is_said_to_be_so_first() {
+        let straight = score(0.3, 1.0, 0.01);
+        let baseline = Some(("fly straight on", straight.as_slice()));
+        let of = |errors: &[(Way, f64)]| {
+            let scores: Vec<_> =
+                errors.iter().map(|(way, e)| (*way, score(*e, 0.5, 0.01))).collect();
+            let seen = Seen::Of(2);
+            Answer::of(&Subject { baseline, seen, ..subject(&scores, vec![drag()]) })
+        };
+        let worse = of(&[(Way::Given, 0.5), (Way::Tuned, 0.6)]);
+        assert_eq!(
+            worse.error,
+            "The model is worse than a forecast without aerodynamics (fly straight on, 0.3): its error at 5 s is 0.5, tuned \
+             to these flights 0.6. Check axes, signs and units of the logs, fly more and richer manoeuvres, or fit it from \
+             scratch."
+        );
+        assert!(worse.behind_baseline());
+        let still = of(&[(Way::Given, 0.5), (Way::Tuned, 0.4), (Way::Effects, 0.35)]);
+        assert!(
+            still.error.contains("flights 0.4, with drag_beta2 0.35. Check"),
+            "{}",
+            still.error
+        );
+        let cured = of(&[(Way::Given, 0.5), (Way::Tuned, 0.2)]);
+        assert_eq!(
+            cured.error,
+            "As given, the model is worse than a forecast without aerodynamics (fly straight on, 0.3). On the 2 flights that \
+             it was fitted to, the error at 5 s falls from 0.5 to 0.2 by tuning (−60 %)."
+        );
+        assert!(!cured.behind_baseline());
+        // of a better model nothing is said about straight flight, whatever tuning does to it
+        let better = of(&[(Way::Given, 0.2), (Way::Tuned, 0.4)]);
+        assert!(better.error.starts_with("Keep the model as it is"), "{}", better.error);
+        assert!(!better.behind_baseline());
     }
 
     #[test]

@@ -173,6 +173,19 @@ impl Numbers {
     pub(super) fn in_vain(&self) -> bool {
         in_vain(&self.steps)
     }
+
+    /// The baseline forecast, if the given model errs more and the later models are derived from it by a fit.
+    pub(super) fn better_baseline(&self) -> Option<&Baseline> {
+        let baseline = self.baseline.as_ref()?;
+        let [given, tuned, ..] = &self.steps[..] else { return None };
+        (tuned.way == Way::Tuned && given.error > baseline.error).then_some(baseline)
+    }
+
+    /// Whether that baseline forecast errs less than every model, so that neither the fit nor added effects help.
+    pub(super) fn all_behind(&self) -> bool {
+        let behind = |b: &Baseline| self.steps.iter().all(|step| step.error > b.error);
+        self.better_baseline().is_some_and(behind)
+    }
 }
 
 fn in_vain(steps: &[Step]) -> bool {

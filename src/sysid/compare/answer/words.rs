@@ -1,16 +1,47 @@
 //! Sentences and phrases of the answer to a comparison or refit, composed from its numbers. The error is that of free runs
 //! (open-loop simulations) at a horizon.
 
-use super::numbers::{Decisive, InUse, Left, NOTICED, Numbers, Step, Way};
+use super::numbers::{Baseline, Decisive, InUse, Left, NOTICED, Numbers, Step, Way};
 
-/// Sentence on the error of the models and its change from one model to the next.
+/// Sentences on the error of the models and its change from one model to the next. If a forecast without aerodynamics errs less
+/// than the model as given, this is stated first.
 pub fn error(n: &Numbers) -> String {
     let Some((first, rest)) = n.steps.split_first() else {
         return "No free run is long enough for an error to be given.".into();
     };
-    if n.in_vain() {
-        return kept(n, first.error, rest[0].error);
+    match n.better_baseline() {
+        Some(baseline) if n.all_behind() => behind(n, baseline, first, rest),
+        Some(baseline) => {
+            format!("As given, the model is {}. {}", worse_than(baseline), changes(n, first, rest))
+        }
+        None if n.in_vain() => kept(n, first.error, rest[0].error),
+        None => changes(n, first, rest),
     }
+}
+
+/// Sentences on a model that errs more than `baseline`, whether it is tuned or not: its errors, and what the user can do.
+fn behind(n: &Numbers, baseline: &Baseline, first: &Step, rest: &[Step]) -> String {
+    let at = |step: &Step| match step.way {
+        Way::Tuned => format!(", tuned to these flights {}", number(step.error)),
+        _ => format!(",{} {}", by(n, step), number(step.error)),
+    };
+    format!(
+        "The model is {}: its error at {} s is {}{}. Check axes, signs and units of the logs, fly more and richer manoeuvres, \
+         or fit it from scratch.",
+        worse_than(baseline),
+        number(n.horizon_s),
+        number(first.error),
+        rest.iter().map(at).collect::<String>()
+    )
+}
+
+fn worse_than(baseline: &Baseline) -> String {
+    let Baseline { name, error } = baseline;
+    format!("worse than a forecast without aerodynamics ({name}, {})", number(*error))
+}
+
+/// Sentence on the error of the model `first` and its change with each model of `rest`.
+fn changes(n: &Numbers, first: &Step, rest: &[Step]) -> String {
     let mut text = format!("{} the error at {} s", on(n), number(n.horizon_s));
     if rest.is_empty() {
         text += &beside_baseline(n, first.error);
