@@ -13,6 +13,8 @@ use greylag_model::GreyBox;
 /// Number of passes in which all coefficients are re-estimated after an effect has been added. Nonlinear effects need
 /// several passes to converge.
 pub const SETTLING: usize = 3;
+/// Largest number of times that the model is linearised again beside a candidate at a physical bound.
+const RELINEARISATIONS: usize = 3;
 /// Largest relative change of a mass or inertia estimate in the re-estimation. A larger change shows that the model's
 /// accelerations were too inaccurate for the estimate.
 const ASTRAY: f64 = 0.1;
@@ -39,11 +41,31 @@ pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
         let threshold = nulls::threshold(&nulls, options.level);
         Ranked { round, scores, nulls, threshold }
     };
-    let ranked = rank(round);
+    let mut ranked = rank(round);
+    for _ in 0..RELINEARISATIONS {
+        match beside_the_strongest(problem, &ranked) {
+            Some(round) => ranked = rank(round),
+            None => break,
+        }
+    }
     match accelerated(problem, &ranked) {
         Some(round) => rank(round),
         None => ranked,
     }
+}
+
+/// Linearises the model again with its coefficients from the joint fit with the candidate of the most evidence, if that
+/// candidate ended at a physical bound. `None` otherwise.
+///
+/// Without the effect, a regression can shrink all coefficients of a channel: of a moment that nearly balances the damping,
+/// the regressors then explain the inertia's small share worst. A column of a control, the derivative times the deflection,
+/// shrinks with them, and its gain would have to be beyond its bound.
+fn beside_the_strongest(problem: &Problem, ranked: &Ranked) -> Option<Round> {
+    let Ranked { round, scores, threshold, .. } = ranked;
+    let (trial, score) =
+        scores.iter().max_by(|(_, a), (_, b)| a.evidence.total_cmp(&b.evidence))?;
+    let bounded = score.evidence > *threshold && round.at_bound(*trial, score);
+    bounded.then(|| Round::new(problem, round.with(score), &round.entries)).flatten()
 }
 
 /// Repeats a round with the accelerations of a better model in the regressors of mass and inertia. The better model is
