@@ -23,13 +23,14 @@ pub fn mapping(logs: &[Info]) -> Option<String> {
                 |c: &&&str| log.channels.iter().any(|own| own.columns.iter().any(|o| o == **c));
             let others = alike.into_iter().flat_map(|(_, others)| others.iter().filter(there));
             for column in std::iter::once(&column).chain(others) {
-                columns.insert((*column).to_owned(), (log.origin(column), cure.scale));
+                let entry = log.entries.get(*column).map(|e| e.times(cure.scale, log.format));
+                columns.extend(entry.map(|entry| ((*column).to_owned(), entry)));
             }
         }
     }
     let mut text = "schema = 1\n\n[columns]\n".to_owned();
-    for (column, (from, scale)) in &columns {
-        let _ = writeln!(text, "{column} = {{ from = {from:?}, scale = {scale:?} }}");
+    for (column, entry) in &columns {
+        let _ = writeln!(text, "{column} = {entry}");
     }
     (!columns.is_empty()).then_some(text)
 }

@@ -15,15 +15,16 @@ fn number(value: &toml::Value) -> Option<f64> {
     value.as_float().or(value.as_integer().map(|n| n as f64))
 }
 
-/// Adds a factor for a column to the mapping `text`, or multiplies the factor that the column already has. `None` if `text` is
-/// not a mapping.
-fn with_column(text: &str, column: &str, from: &str, scale: f64) -> Option<String> {
+/// Adds the entry `read` for a column to the mapping `text`, unless the column has one already, and multiplies its factor by
+/// `scale`. `None` if `text` is not a mapping.
+fn with_column(text: &str, column: &str, read: &str, scale: f64) -> Option<String> {
     let mut table: toml::Table = toml::from_str(text).ok()?;
     table.insert("schema".into(), 1.into());
     let columns = table.entry("columns").or_insert(toml::Table::new().into()).as_table_mut()?;
-    let mut entry = columns.get(column).and_then(|c| c.as_table()).cloned().unwrap_or_default();
+    let read: toml::Table = toml::from_str(&format!("entry = {read}")).ok()?;
+    let given = columns.get(column).or(read.get("entry"));
+    let mut entry = given?.as_table()?.clone();
     let before = entry.get("scale").and_then(number).unwrap_or(1.0);
-    entry.entry("from").or_insert_with(|| from.into());
     entry.insert("scale".into(), (before * scale).into());
     // the offset is added after the scale
     if let Some(offset) = entry.get("offset").and_then(number) {
@@ -67,13 +68,15 @@ impl Inner {
     fn map(&mut self, place: usize, column: &str, scale: f64) -> Result<(), WorkbenchError> {
         let path = self.folder.join(FILE);
         let flight = self.flights.get(place).and_then(|f| f.as_ref().ok());
-        let from = flight.ok_or(WorkbenchError::NoFlight(place))?.info.origin(column);
+        let info = &flight.ok_or(WorkbenchError::NoFlight(place))?.info;
+        let entry = info.entries.get(column);
+        let entry = entry.ok_or_else(|| WorkbenchError::Computed(column.to_owned()))?;
         if self.given.mapping.is_some() {
-            return Err(WorkbenchError::MappingGiven(format!(
-                "{column} = {{ from = \"{from}\", scale = {scale} }}"
-            )));
+            let entry = entry.times(scale, info.format);
+            return Err(WorkbenchError::MappingGiven(format!("{column} = {entry}")));
         }
-        let text = with_column(&self.mapping.text, column, &from, scale);
+        let read = entry.times(1.0, info.format);
+        let text = with_column(&self.mapping.text, column, &read, scale);
         self.read_by(&path, text.ok_or_else(|| WorkbenchError::NoMapping(path.clone()))?)?;
         self.reread();
         let all = self.flights.iter().enumerate().filter(|_| !self.given.despite_problems);
@@ -96,9 +99,9 @@ mod tests {
 
     #[test]
     fn a_column_that_is_mapped_already_is_scaled_once_more() {
-        let once = with_column("", "az_mps2", "csv.az_mps2", -1.0).unwrap();
-        let twice = with_column(&once, "az_mps2", "csv.az_mps2", 9.80665).unwrap();
-        let both = with_column(&twice, "p_radps", "csv.p_radps", 0.0174533).unwrap();
+        let once = with_column("", "az_mps2", "{ from = \"csv.az_mps2\" }", -1.0).unwrap();
+        let twice = with_column(&once, "az_mps2", "{ from = \"csv.az_mps2\" }", 9.80665).unwrap();
+        let both = with_column(&twice, "p_radps", "{ from = \"csv.p_radps\" }", 0.0174533).unwrap();
         let read: toml::Table = toml::from_str(&both).unwrap();
         assert_eq!(read["columns"]["az_mps2"]["scale"].as_float(), Some(-9.80665));
         assert_eq!(read["columns"]["p_radps"]["from"].as_str(), Some("csv.p_radps"));
@@ -109,7 +112,7 @@ mod tests {
     fn the_field_and_the_offset_of_a_mapped_column_are_kept() {
         let mapped =
             "[columns]\naz_mps2 = { from = \"imu.az\", offset = 2.0, rate_over_s = 0.1 }\n";
-        let scaled = with_column(mapped, "az_mps2", "csv.az_mps2", -1.0).unwrap();
+        let scaled = with_column(mapped, "az_mps2", "{ from = \"csv.az_mps2\" }", -1.0).unwrap();
         let read: toml::Table = toml::from_str(&scaled).unwrap();
         let entry = &read["columns"]["az_mps2"];
         assert_eq!(entry["from"].as_str(), Some("imu.az"));
