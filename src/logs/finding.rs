@@ -28,6 +28,21 @@ pub struct Cure {
     pub scale: f64,
 }
 
+/// Groups of columns with a common unit. A finding about a wrong unit names the first column of its group.
+const ALIKE: [[&str; 3]; 3] = [
+    ["roll_rad", "pitch_rad", "yaw_rad"],
+    ["p_radps", "q_radps", "r_radps"],
+    ["ax_mps2", "ay_mps2", "az_mps2"],
+];
+
+impl Cure {
+    /// The columns that are multiplied: the column itself. If its unit is wrong, the unit of its whole group is.
+    pub fn columns(&self) -> Vec<&str> {
+        let group = ALIKE.iter().find(|group| group[0] == self.column && self.scale > 0.0);
+        group.map_or_else(|| vec![self.column.as_str()], |group| group.to_vec())
+    }
+}
+
 impl std::fmt::Display for Cure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Cure { column, scale } = self;

@@ -134,7 +134,7 @@ pub enum WorkbenchError {
     Present(String),
     /// The logs are read with a mapping file of the user, which the workbench does not change.
     #[error(
-        "the logs are read by a mapping of your own; add this line to its [columns] and start again: {0}"
+        "the logs are read by a mapping of your own; add to its [columns] and start again: {0}"
     )]
     MappingGiven(String),
     /// No factor in a mapping corrects this column.

@@ -6,6 +6,8 @@ use std::path::PathBuf;
 use super::bench::{Bench, Inner};
 use super::error::{WorkbenchError, io};
 use super::session::Role;
+use greylag_logs::finding::Cure;
+use greylag_logs::mapping::Entry;
 use greylag_report::write_over;
 
 /// Name of the mapping file in the session's folder.
@@ -35,7 +37,7 @@ fn with_column(text: &str, column: &str, read: &str, scale: f64) -> Option<Strin
 }
 
 impl Bench {
-    /// Adds a factor for a column to the session's mapping, and reads all logs again.
+    /// Adds a factor for a column, or for all columns with its unit, to the session's mapping, and reads all logs again.
     pub(super) fn map(
         &self,
         seen: u64,
@@ -69,14 +71,21 @@ impl Inner {
         let path = self.folder.join(FILE);
         let flight = self.flights.get(place).and_then(|f| f.as_ref().ok());
         let info = &flight.ok_or(WorkbenchError::NoFlight(place))?.info;
-        let entry = info.entries.get(column);
-        let entry = entry.ok_or_else(|| WorkbenchError::Computed(column.to_owned()))?;
-        if self.given.mapping.is_some() {
-            let entry = entry.times(scale, info.format);
-            return Err(WorkbenchError::MappingGiven(format!("{column} = {entry}")));
+        if !info.entries.contains_key(column) {
+            return Err(WorkbenchError::Computed(column.to_owned()));
         }
-        let read = entry.times(1.0, info.format);
-        let text = with_column(&self.mapping.text, column, &read, scale);
+        let cure = Cure { column: column.to_owned(), scale };
+        let entries = cure.columns().into_iter().filter_map(|c| Some((c, info.entries.get(c)?)));
+        let entries: Vec<_> = entries.collect();
+        if self.given.mapping.is_some() {
+            let line =
+                |(c, entry): &(&str, &Entry)| format!("{c} = {}", entry.times(scale, info.format));
+            let lines: Vec<String> = entries.iter().map(line).collect();
+            return Err(WorkbenchError::MappingGiven(lines.join("\n")));
+        }
+        let text = entries.iter().try_fold(self.mapping.text.clone(), |text, (c, entry)| {
+            with_column(&text, c, &entry.times(1.0, info.format), scale)
+        });
         self.read_by(&path, text.ok_or_else(|| WorkbenchError::NoMapping(path.clone()))?)?;
         self.reread();
         let all = self.flights.iter().enumerate().filter(|_| !self.given.despite_problems);
