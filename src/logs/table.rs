@@ -21,6 +21,7 @@ use std::collections::BTreeMap;
 
 use super::Sample;
 use super::columns::{COLUMNS, EITHER, NEEDED, index};
+use super::csv::make_true;
 use super::finding::Finding;
 use super::load::Channel;
 use super::mapping::Entry;
@@ -31,7 +32,6 @@ use super::sources::{Asked, Choice, Source};
 use super::stretches::Watch;
 use super::topics::{Topic, Topics, period_s};
 use clean::cleaned;
-use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, standard_density};
 pub(super) use whole::Whole;
 
 /// Longest gap of a fast channel that is filled, s.
@@ -354,26 +354,6 @@ fn hold(rows: &mut [Sample], track: &Track<'_>, fresh: &[bool]) {
     }
 }
 
-/// Converts the airspeed of `rows` from equivalent to true airspeed. Returns a note on the air densities that were used.
-fn make_true(rows: &mut [Sample]) -> String {
-    let mut by = [0usize; 3];
-    for row in rows.iter_mut().filter(|row| row.airspeed_mps.is_finite()) {
-        let (i, density) = if row.air_density_kgpm3 > 0.0 {
-            (0, row.air_density_kgpm3)
-        } else if row.altitude_m.is_finite() {
-            (1, standard_density(row.altitude_m))
-        } else {
-            (2, SEA_LEVEL_DENSITY)
-        };
-        by[i] += 1;
-        row.airspeed_mps *= (SEA_LEVEL_DENSITY / density).sqrt();
-    }
-    format!(
-        "true airspeed by logged density in {} rows, by the standard atmosphere at the logged altitude in {}, at sea level in {}",
-        by[0], by[1], by[2]
-    )
-}
-
 /// Removes the rows before the first one in which all required columns are filled, and those after the last such row.
 fn cut_ends(rows: &mut Vec<Sample>, notes: &mut Vec<String>) {
     let whole =
@@ -389,3 +369,6 @@ fn cut_ends(rows: &mut Vec<Sample>, notes: &mut Vec<String>) {
         rows.drain(..first);
     }
 }
+
+#[cfg(test)]
+mod tests;
