@@ -10,7 +10,7 @@ use greylag::num::ROW;
 use greylag::physics::ActuatorState;
 use greylag::physics::servos::Surface;
 use greylag::sim::flown::Flown;
-use greylag::sim::imagined::{Ended, Imagination, bounds};
+use greylag::sim::imagined::{Ended, Imagination, Validity};
 use greylag::sim::targets::Stratified;
 use greylag::sim::{self, Trouble};
 use greylag_sitl::plant::PlantOptions;
@@ -71,7 +71,8 @@ impl World {
     #[staticmethod]
     fn x8(model: &Model, seed: u64, corners: f64, airspeeds: &str) -> PyResult<World> {
         let targets = targets(&model.model, seed, corners, airspeeds)?;
-        let world = Flown::new(&PlantOptions::default(), targets).map_err(raised)?;
+        let (plant, airframe) = (PlantOptions::default(), &model.model.airframe);
+        let world = Flown::new(&plant, airframe, targets).map_err(raised)?;
         Ok(World::new(Box::new(world), 1, &model.model))
     }
 
@@ -198,7 +199,7 @@ fn targets(model: &GreyBox, seed: u64, corners: f64, airspeeds: &str) -> PyResul
 /// Smallest and largest value of each observation. They are at the bounds of the state, because [`observe`] is
 /// monotonic in each of its arguments.
 fn observable(model: &GreyBox) -> [[f64; OBSERVATIONS]; 2] {
-    let [least, most] = bounds();
+    let [least, most] = Validity::of(&model.airframe).bounds();
     let figures = &model.airframe.actuators;
     let reach = |surface: &Surface| {
         let travel = surface.travel;

@@ -64,6 +64,14 @@ def test_without_names_all_of_one_length_are_written_and_the_others_named(write,
     assert "gps: 50 samples, not 500" in text and "flight.mass" in text and "note" in text
 
 
+@pytest.mark.parametrize("write", [mat5, mat73])
+def test_a_matrix_with_a_signal_in_each_row_is_read_like_its_transpose(write, tmp_path):
+    path = write(tmp_path / "flight.mat", flight=FLIGHT | {"att": FLIGHT["att"].T})
+    columns = mat_to_csv(path, tmp_path / "out.csv", {"time_s": "flight.t", "yaw_rad": "flight.att[2]"})
+    assert columns == ["time_s", "yaw_rad"]
+    np.testing.assert_array_equal(pd.read_csv(tmp_path / "out.csv")["yaw_rad"], T)
+
+
 def test_arrays_of_structs_have_numbers(tmp_path):
     both = np.array([(T,), (2 * T,)], dtype=[("p", object)])
     path = mat5(tmp_path / "two.mat", imu=both, words="text", cells=np.array(["a", "b"], dtype=object))

@@ -8,6 +8,7 @@ use crate::Observation;
 use greylag_model::{GreyBox, Memory, STEP};
 use greylag_physics::State;
 use greylag_physics::actuators::Actuators;
+use greylag_physics::inputs::InputMemory;
 
 /// The zero disturbance.
 pub(crate) const NONE: State =
@@ -41,6 +42,9 @@ pub(crate) struct Disturbance {
     time_constant: f64,
     last: Option<Observation>,
     memory: Memory,
+    /// Memory of the model's input effects and lags. `None` before the first prediction and after a gap: the controls are then
+    /// taken to be at rest.
+    inputs: Option<InputMemory>,
     rate: State,
     /// Mean squares over [`MEMORY_S`] of the prediction error and of the measured state change, (x_c per second)².
     missed: f64,
@@ -54,8 +58,16 @@ impl Disturbance {
     /// A zero estimate with time constant `time_constant` (s).
     pub fn new(time_constant: f64) -> Disturbance {
         let (missed, happened, slope) = (0.0, 0.0, [0.0; 2]);
-        let memory = Memory::default();
-        Disturbance { time_constant, last: None, memory, rate: NONE, missed, happened, slope }
+        Disturbance {
+            time_constant,
+            last: None,
+            memory: Memory::default(),
+            inputs: None,
+            rate: NONE,
+            missed,
+            happened,
+            slope,
+        }
     }
 
     /// Updates the estimates with the difference between `seen` and the model's prediction from the last tick. After a gap
@@ -67,12 +79,14 @@ impl Disturbance {
         };
         let last = self.last.replace(*seen).filter(follows);
         let Some(last) = last else {
-            self.memory = Memory::default();
+            (self.memory, self.inputs) = (Memory::default(), None);
             return;
         };
         let figures = &model.airframe.actuators;
-        let controls =
+        let measured =
             Actuators::from_observed(&last.actuators, &last.previous, figures).controls();
+        let inputs = self.inputs.get_or_insert_with(|| model.at_rest(&measured));
+        let controls = model.act(&measured, inputs);
         let expected = model.step(&last.state, &controls, last.altitude, &mut self.memory);
         let mut error = seen.state.advance(&expected, -1.0);
         error.roll = (error.roll + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU)
@@ -85,7 +99,7 @@ impl Disturbance {
         if moved.is_finite() {
             self.rate = moved;
         } else {
-            self.memory = Memory::default();
+            (self.memory, self.inputs) = (Memory::default(), None);
         }
     }
 
@@ -208,6 +222,38 @@ mod tests {
             (state.p, state.q, state.r) = (state.p + kick(), state.q + kick(), state.r + kick());
         }
         disturbance
+    }
+
+    /// A model with an effect between actuators and surfaces predicts its own flight: nothing is left to a disturbance.
+    #[test]
+    fn input_effects_are_no_disturbance() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/prior.toml");
+        for (effect, constant) in [("servo_aileron", 0.2), ("actuator_lag", 0.05)] {
+            let mut model = GreyBox::load(&path).unwrap();
+            model.join(effect, &[constant]).unwrap();
+            let mut disturbance = Disturbance::new(TIME_CONSTANT_S);
+            let (mut state, mut memory, mut inputs) = (State::NEUTRAL, Memory::default(), None);
+            for tick in 0..200_u64 {
+                let aileron = if (tick / 25).is_multiple_of(2) { 0.1 } else { -0.1 };
+                let actuators = ActuatorState { aileron, ..ActuatorState::default() };
+                let seen = Observation {
+                    time: Time::from_micros(10_000 * tick),
+                    state,
+                    actuators,
+                    altitude: 600.0,
+                    previous: [Command::IDLE; 2],
+                };
+                disturbance.update(&model, &seen);
+                let figures = &model.airframe.actuators;
+                let measured =
+                    Actuators::from_observed(&actuators, &seen.previous, figures).controls();
+                let past = inputs.get_or_insert_with(|| model.at_rest(&measured));
+                let controls = model.act(&measured, past);
+                state = model.step(&state, &controls, 600.0, &mut memory);
+            }
+            let left = disturbance.rate().to_array();
+            assert!(left.iter().all(|x| x.abs() < 1e-9), "{effect}: {left:?}");
+        }
     }
 
     #[test]

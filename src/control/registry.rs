@@ -64,6 +64,19 @@ pub enum SetupError {
         /// Name of the controller.
         name: &'static str,
     },
+    /// A change of a setting has no effect on the planner.
+    #[error(
+        "controller {name} cannot use {change}: it has no {lacked}; leave {change} out, or choose a controller that \
+         has one, such as hybrid-lqi"
+    )]
+    Ineffective {
+        /// Name of the controller.
+        name: &'static str,
+        /// The change of a setting.
+        change: cem::Change,
+        /// What the controller would need to use the setting.
+        lacked: &'static str,
+    },
 }
 
 /// Inputs from which a controller is built.
@@ -119,7 +132,13 @@ impl<'a> Source<'a> {
         }
         let ilqr = base.clone().filter(|_| settings.ilqr);
         let ilqr = ilqr.map(|lqi| ilqr::Ilqr::new(self.model, lqi));
-        Ok(cem::Cem::new(name, self.model, settings, cem::Aids { agent, base, ilqr }))
+        let aids = cem::Aids { agent, base, ilqr };
+        if let Some((change, lacked)) =
+            self.changes.iter().find_map(|c| Some((*c, c.lacks(&aids)?)))
+        {
+            return Err(SetupError::Ineffective { name, change, lacked });
+        }
+        Ok(cem::Cem::new(name, self.model, settings, aids))
     }
 }
 
@@ -185,7 +204,7 @@ macro_rules! controllers {
         /// # Errors
         ///
         /// If no LQI can be designed from the model, the model has an effect that was not accepted, a required policy or its
-        /// critics are missing, or the shipped policy for all aircraft cannot be read.
+        /// critics are missing, a changed setting has no effect, or the shipped policy for all aircraft cannot be read.
         pub fn build<'a>(
             kind: ControllerKind,
             source: impl Into<Source<'a>>,

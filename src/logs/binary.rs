@@ -7,9 +7,8 @@
 use std::path::Path;
 
 use super::error::LogError;
-use super::finding::Finding;
+use super::finding::{Finding, named};
 use super::load::{Log, Options, Use, dropped, hint};
-use super::mapping::rule::Rule;
 use super::phases::{self, Flying};
 use super::stretches::Stretches;
 use super::topics::{Naming, Topics};
@@ -35,6 +34,7 @@ pub(super) fn read(
     let mut table = table::build(&topics, &o.mapping.rules(format, &topics), &o.sources);
     // the topics are freed, so that a long log is not in memory twice
     topics.topics.clear();
+    let entries = o.mapping.over(std::mem::take(&mut table.entries));
     let flies = Flying { bridged_s: bridged_s(&table), ..o.flies };
     let stretches = table.whole.take().map(|whole| of_all(whole, &hovers, &o.flies));
     findings.extend(stretches.iter().map(|stretches| Finding::note(stretches.said())));
@@ -52,22 +52,16 @@ pub(super) fn read(
     if !no_wings {
         findings.extend(assess::channels(&table.channels, &table.rows, &flies));
         let found = on_wings(&mut table.rows, &hovers, &flies);
-        findings.extend(found.into_iter().map(|f| named(f, &table.rules, o)));
+        findings.extend(found.into_iter().map(|f| named(f, &entries, format)));
     }
     let kept = kept(&mut table, path, o, to, &mut findings)?;
     findings.extend(dropped(kept.dropped, &kept.dropped_rows));
     findings.extend(table.notes.iter().map(Finding::note));
     Ok(Log {
         format,
-        flight: Flight {
-            name: name.to_owned(),
-            samples: kept.samples,
-            flow_angles: flow_angles(format, o),
-            sensors: o.mapping.sensors().clone(),
-            unknown_columns: Vec::new(),
-            notes: table.notes,
-        },
+        flight: flight(name, (kept.samples, table.notes), format, o),
         channels: table.channels,
+        entries,
         topics: topics.counts.into_iter().map(|((name, i), n)| (name, i, n)).collect(),
         dropped: kept.dropped,
         dropped_rows: kept.dropped_rows,
@@ -79,6 +73,23 @@ pub(super) fn read(
         life: topics.life,
         stretches,
     })
+}
+
+/// The flight `name` with its samples and notes.
+fn flight(
+    name: &str,
+    (samples, notes): (Vec<Sample>, Vec<String>),
+    format: Format,
+    o: &Options,
+) -> Flight {
+    Flight {
+        name: name.to_owned(),
+        samples,
+        flow_angles: flow_angles(format, o),
+        sensors: o.mapping.sensors().clone(),
+        unknown_columns: Vec::new(),
+        notes,
+    }
 }
 
 /// Time (s) without rows that must not split a phase of flight. It is longer than any interval between the kept stretches of the
@@ -172,34 +183,6 @@ fn grounded(
             "{out} of {before} rows are left out: the vehicle hovers as well ({by}), and its lift motors carry or it changes over there"
         ))),
     }
-}
-
-/// Whether the factor `gain` converts degrees into radians, apart from the sign.
-fn near_degree(gain: f64) -> bool {
-    (gain.abs() / 1_f64.to_radians() - 1.0).abs() < 0.01
-}
-
-/// Adapts the correction that a finding proposes to a binary log. The text then names the topic and the field that fill the
-/// column. The reader multiplies this field by a factor itself, so the proposed factor includes that factor.
-fn named(finding: Finding, rules: &[Rule], o: &Options) -> Finding {
-    let Some(cure) = &finding.cure else { return finding };
-    let rule = rules.iter().find(|r| r.columns()[0] == cure.column && r.factor().is_some());
-    let own = o.mapping.get(&cure.column).is_some();
-    let Some(rule) = rule.filter(|_| !own) else { return finding };
-    let Some((field, gain)) = rule.factor() else { return finding };
-    if near_degree(gain) && near_degree(cure.scale) {
-        let text = format!(
-            "{} is beyond 57° for more than a twentieth of the flight ({}.{field}, which the reader takes for degrees): no flow that a model of an aircraft on its wings describes",
-            cure.column, rule.topic
-        );
-        return Finding::warning(text);
-    }
-    let scale = gain * cure.scale;
-    let better = format!(
-        "read it with --mapping FILE, in which [columns] has {} = {{ from = \"{}.{field}\", scale = {scale} }}",
-        cure.column, rule.topic
-    );
-    Finding { text: finding.text.replace(&cure.to_string(), &better), ..finding }
 }
 
 /// Intervals (from, to, s) in which a VTOL is not in wing-borne flight; empty for other vehicles.

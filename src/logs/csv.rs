@@ -10,6 +10,7 @@ mod thin;
 mod write;
 
 pub use super::rows::Tolerance;
+pub(crate) use airspeed::make_true;
 pub use quaternion::Order;
 pub(crate) use raw::{Raw, raw, read};
 pub use write::Rows;

@@ -335,11 +335,11 @@ impl Reader {
     }
 }
 
-/// Name and value of the parameter in a record.
+/// Name and value of the parameter in a record; `None` if the value is not a number.
 fn parameter(declared: &Declared, body: &[u8]) -> Option<(String, f64)> {
     let find = |label: &str| declared.fields.iter().find(|f| f.0 == label);
     let (name, value) = (find("Name")?, find("Value")?);
-    let value = number(value.1, body, value.2);
+    let value = Some(number(value.1, body, value.2)).filter(|x| x.is_finite())?;
     Some((text(body.get(name.2..name.2 + 16).unwrap_or_default()), value))
 }
 

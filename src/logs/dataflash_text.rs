@@ -169,6 +169,21 @@ fn record(kind: u8, letters: &str, values: &[&str]) -> Option<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dataflash::read;
+    use crate::stretches::Keep;
+
+    /// With a NaN as its pulse at full deflection, a surface would be read as always neutral.
+    #[test]
+    fn a_parameter_that_is_no_number_is_left_out() {
+        let log = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
+            FMT, 64, 31, PARM, QNf, TimeUS,Name,Value\n\
+            PARM, 1, SERVO1_MIN, 1100\nPARM, 1, SERVO1_MAX, nan\nPARM, 1, SERVO1_TRIM, 1500\n";
+        let mut source = log.as_bytes();
+        let mut binary = Binary::new(&mut source);
+        let (lives, _) = read(&mut binary, &|_| true, Keep::All);
+        let names: Vec<&str> = lives[0].parameters.keys().map(String::as_str).collect();
+        assert_eq!(names, ["SERVO1_MIN", "SERVO1_TRIM"]);
+    }
 
     #[test]
     fn a_line_with_a_number_that_cannot_be_read_is_no_record_of_zeros() {

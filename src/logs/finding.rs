@@ -1,8 +1,11 @@
 //! Findings: defects and peculiarities of a log, which are reported to the user.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
-use super::mapping::TEXT;
+use super::format::Format;
+use super::mapping::{Entry, TEXT};
 
 /// How much a finding matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -23,6 +26,21 @@ pub struct Cure {
     pub column: String,
     /// Factor by which the column is multiplied.
     pub scale: f64,
+}
+
+/// Groups of columns with a common unit. A finding about a wrong unit names the first column of its group.
+const ALIKE: [[&str; 3]; 3] = [
+    ["roll_rad", "pitch_rad", "yaw_rad"],
+    ["p_radps", "q_radps", "r_radps"],
+    ["ax_mps2", "ay_mps2", "az_mps2"],
+];
+
+impl Cure {
+    /// The columns that are multiplied: the column itself. If its unit is wrong, the unit of its whole group is.
+    pub fn columns(&self) -> Vec<&str> {
+        let group = ALIKE.iter().find(|group| group[0] == self.column && self.scale > 0.0);
+        group.map_or_else(|| vec![self.column.as_str()], |group| group.to_vec())
+    }
 }
 
 impl std::fmt::Display for Cure {
@@ -69,6 +87,40 @@ impl Finding {
     }
 }
 
+/// Whether the factor `gain` converts degrees into radians, apart from the sign.
+fn near_degree(gain: f64) -> bool {
+    (gain.abs() / 1_f64.to_radians() - 1.0).abs() < 0.01
+}
+
+/// Adapts the correction that `finding` proposes to the log. `entries` has the entry of a mapping file for each column that a
+/// single field fills. The text then has the whole entry: the field, and the reader's own factor times the correction. A column
+/// that has no entry cannot be corrected by a factor.
+pub(super) fn named(
+    finding: Finding,
+    entries: &BTreeMap<String, Entry>,
+    format: Format,
+) -> Finding {
+    let Some(Cure { column, scale }) = &finding.cure else { return finding };
+    let said = finding.cure.iter().map(Cure::to_string).collect::<String>();
+    let Some(entry) = entries.get(column) else {
+        let better = format!(
+            "{column} is computed from several fields or from servo pulses, so that no factor in a mapping corrects it: state what the outputs drive in [surfaces] of an airframe file (--airframe), or name another field in a mapping (--mapping)"
+        );
+        return Finding { text: finding.text.replace(&said, &better), cure: None, ..finding };
+    };
+    if near_degree(entry.scale) && near_degree(*scale) {
+        return Finding::warning(format!(
+            "{column} is beyond 57° for more than a twentieth of the flight ({}.{}, which the reader takes for degrees): no flow that a model of an aircraft on its wings describes",
+            entry.topic, entry.field
+        ));
+    }
+    let better = format!(
+        "read it with --mapping FILE, in which [columns] has {column} = {}",
+        entry.times(*scale, format)
+    );
+    Finding { text: finding.text.replace(&said, &better), ..finding }
+}
+
 impl std::fmt::Display for Finding {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let word = match self.severity {
@@ -86,6 +138,29 @@ mod tests {
 
     use super::*;
     use crate::mapping::Mapping;
+
+    #[test]
+    fn a_cure_of_a_log_has_its_field_with_the_readers_own_factor() {
+        let cure = Cure { column: "elevator_cmd".into(), scale: -1.0 };
+        let found =
+            Finding { cure: Some(cure.clone()), ..Finding::problem(format!("turned: {cure}")) };
+        let entry = Entry {
+            offset: 0.25,
+            instance: Some(0x0102),
+            ..Entry::scaled("MANUAL_CONTROL", "x", -0.001)
+        };
+        for format in [Format::Ulog, Format::Tlog] {
+            let entries = BTreeMap::from([("elevator_cmd".to_owned(), entry.clone())]);
+            let said = named(found.clone(), &entries, format).text;
+            let (_, line) = said.split_once("[columns] has ").unwrap();
+            let text = format!("schema = 1\n[columns]\n{line}\n");
+            let mapping = Mapping::parse(&text, Path::new("m.toml")).unwrap();
+            let right = Entry { scale: 0.001, offset: -0.25, ..entry.clone() };
+            assert_eq!(mapping.get("elevator_cmd"), Some(&right), "{text}");
+        }
+        let computed = named(found, &BTreeMap::new(), Format::Ulog);
+        assert!(computed.cure.is_none() && computed.text.contains("--airframe"), "{computed}");
+    }
 
     #[test]
     fn the_sentence_of_a_cure_holds_a_line_of_a_mapping() {

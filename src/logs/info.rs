@@ -1,10 +1,12 @@
 //! Summary of a log: its content, its length, and the channels that it lacks for each purpose, such as a comparison of moments.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use super::columns::{BLOCK, COLUMNS, index};
 use super::finding::{Finding, Severity};
-use super::mapping::TEXT;
+use super::mapping::Entry;
 use super::phases::{self, Phase, PhaseKind};
 use super::rudder::RudderMotion;
 use super::sources::Source;
@@ -46,6 +48,9 @@ pub struct Info {
     pub sources: Vec<Source>,
     /// Channels of the file that fill columns of the table.
     pub channels: Vec<Channel>,
+    /// For each column that a single field fills: the entry of a mapping file that fills it in the same way.
+    #[serde(skip)]
+    pub entries: BTreeMap<String, Entry>,
     /// Purposes with the channels that the log lacks for each.
     pub purposes: Vec<Purpose>,
     /// Topics (kinds of records) of the file: name, instance, number of records.
@@ -68,15 +73,6 @@ pub struct Purpose {
 }
 
 impl Info {
-    /// Field of the log that fills `column`, written as in a mapping file, which assigns fields to columns.
-    pub fn origin(&self, column: &str) -> String {
-        let named = |c: &&Channel| c.columns.iter().any(|own| own == column);
-        match (self.format, self.channels.iter().find(named)) {
-            (Format::Csv, _) | (_, None) => format!("{TEXT}.{column}"),
-            (_, Some(channel)) => channel.origin.clone(),
-        }
-    }
-
     /// The summary of the log `log`.
     pub fn of(log: &Log) -> Info {
         let samples = &log.flight.samples;
@@ -112,6 +108,7 @@ impl Info {
             life: log.life.clone(),
             sources: log.sources.clone(),
             channels: log.channels.clone(),
+            entries: log.entries.clone(),
             purposes: purposes(log).into_iter().map(|p| weighed(log, flight_s, p)).collect(),
             topics: log.topics.clone(),
             findings: rudder(log).into_iter().chain(log.findings.iter().cloned()).collect(),

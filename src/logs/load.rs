@@ -3,6 +3,7 @@
 //! A finding is a defect or peculiarity of the log that is reported to the user. A mapping states which field of the file fills which
 //! column.
 
+use std::collections::BTreeMap;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
@@ -15,7 +16,7 @@ use super::error::LogError;
 use super::finding::{Finding, Severity};
 use super::foreign;
 use super::format::{DATAFLASH_MAGIC, Format};
-use super::mapping::Mapping;
+use super::mapping::{Entry, Mapping};
 use super::phases::{self, Flying, Phase, PhaseKind};
 use super::quality::Quality;
 use super::sources::{Asked, Source};
@@ -63,6 +64,8 @@ pub struct Log {
     pub flight: Flight,
     /// Channels of the file that fill the table.
     pub channels: Vec<Channel>,
+    /// For each column that a single field fills: the entry of a mapping file that fills it in the same way.
+    pub entries: BTreeMap<String, Entry>,
     /// All topics of the file, used or not: name, instance and number of records.
     pub topics: Vec<(String, u16, usize)>,
     /// Number of rows dropped because they are out of order, repeated, incomplete or impossible.

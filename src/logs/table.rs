@@ -17,11 +17,14 @@ mod clean;
 mod whole;
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 use super::Sample;
 use super::columns::{COLUMNS, EITHER, NEEDED, index};
+use super::csv::make_true;
 use super::finding::Finding;
 use super::load::Channel;
+use super::mapping::Entry;
 use super::mapping::rule::Rule;
 use super::quality::{self, Quality};
 use super::resample::{Reader, SAME_S};
@@ -29,7 +32,6 @@ use super::sources::{Asked, Choice, Source};
 use super::stretches::Watch;
 use super::topics::{Topic, Topics, period_s};
 use clean::cleaned;
-use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, standard_density};
 pub(super) use whole::Whole;
 
 /// Longest gap of a fast channel that is filled, s.
@@ -60,6 +62,8 @@ const MEASURED: [&str; 9] = [
 /// all channels would take as much memory as the topics.
 struct Track<'a> {
     rule: Rule,
+    /// The instance of the rule's topic.
+    instance: u16,
     origin: String,
     times: Cow<'a, [f64]>,
     /// Whether all samples have the same value.
@@ -139,8 +143,8 @@ pub(super) struct Table {
     pub sources: Vec<Source>,
     /// Findings about unusual sources.
     pub findings: Vec<Finding>,
-    /// The rule that fills each column.
-    pub rules: Vec<Rule>,
+    /// For each column that a single field fills: the entry of a mapping file that fills it in the same way.
+    pub entries: BTreeMap<String, Entry>,
     /// Statistics of the whole log, if only stretches of it are kept in memory.
     pub whole: Option<Whole>,
 }
@@ -197,6 +201,9 @@ pub(super) fn build(topics: &Topics, rules: &[Rule], asked: &[Asked]) -> Table {
         notes.push(make_true(&mut rows));
     }
     sparse.iter().for_each(|(track, fresh)| hold(&mut rows, track, fresh));
+    let entry =
+        |t: &Track<'_>| Some((t.rule.columns()[0].to_owned(), Entry::of(&t.rule, t.instance)?));
+    let entries = tracks.iter().filter_map(entry).collect();
     if missing.is_empty() {
         cut_ends(&mut rows, &mut notes);
     }
@@ -208,7 +215,7 @@ pub(super) fn build(topics: &Topics, rules: &[Rule], asked: &[Asked]) -> Table {
         whole,
         sources: choice.sources,
         findings: choice.findings,
-        rules: tracks.into_iter().map(|t| t.rule).collect(),
+        entries,
     }
 }
 
@@ -299,7 +306,7 @@ fn track_of<'a>(
     let period = period_s(&times);
     let rate_hz = if period > 0.0 { 1.0 / period } else { 0.0 };
     let dead = series.iter().all(|s| s.iter().all(|x| *x == s[0]));
-    Some(Track { rule: rule.clone(), origin, times, dead, finite_share, rate_hz, topic })
+    Some(Track { rule: rule.clone(), instance, origin, times, dead, finite_share, rate_hz, topic })
 }
 
 fn fill(rows: &mut [Sample], track: &Track<'_>, series: &[Vec<f64>]) {
@@ -347,26 +354,6 @@ fn hold(rows: &mut [Sample], track: &Track<'_>, fresh: &[bool]) {
     }
 }
 
-/// Converts the airspeed of `rows` from equivalent to true airspeed. Returns a note on the air densities that were used.
-fn make_true(rows: &mut [Sample]) -> String {
-    let mut by = [0usize; 3];
-    for row in rows.iter_mut().filter(|row| row.airspeed_mps.is_finite()) {
-        let (i, density) = if row.air_density_kgpm3 > 0.0 {
-            (0, row.air_density_kgpm3)
-        } else if row.altitude_m.is_finite() {
-            (1, standard_density(row.altitude_m))
-        } else {
-            (2, SEA_LEVEL_DENSITY)
-        };
-        by[i] += 1;
-        row.airspeed_mps *= (SEA_LEVEL_DENSITY / density).sqrt();
-    }
-    format!(
-        "true airspeed by logged density in {} rows, by the standard atmosphere at the logged altitude in {}, at sea level in {}",
-        by[0], by[1], by[2]
-    )
-}
-
 /// Removes the rows before the first one in which all required columns are filled, and those after the last such row.
 fn cut_ends(rows: &mut Vec<Sample>, notes: &mut Vec<String>) {
     let whole =
@@ -382,3 +369,6 @@ fn cut_ends(rows: &mut Vec<Sample>, notes: &mut Vec<String>) {
         rows.drain(..first);
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,14 +1,15 @@
 //! Reads the flights of a CSV table and checks them. A table may contain several recordings, one after the other.
 
+use std::collections::BTreeMap;
 use std::io::BufRead;
 use std::path::Path;
 
 use super::columns::{BLOCK, COLUMNS, EITHER};
 use super::csv::{self, CsvError, Raw};
 use super::error::LogError;
-use super::finding::Finding;
+use super::finding::{Finding, named};
 use super::load::{Channel, Log, Options, Use, dropped, hint, name};
-use super::mapping::Mapping;
+use super::mapping::{Entry, Mapping};
 use super::phases::Flying;
 use super::quality::Quality;
 use super::stretches::Keep;
@@ -47,6 +48,9 @@ pub(super) fn read(
     Ok(recordings.into_iter().enumerate().map(one).collect())
 }
 
+/// Text of the finding about a file that ends in the middle of a row.
+const CUT_SHORT: &str = "the file ends in the middle of a row, which is left out";
+
 fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Log, LogError> {
     let missing = std::mem::take(&mut raw.missing);
     let lacking = !missing.is_empty();
@@ -61,9 +65,9 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
         }
         findings.push(Finding::problem(first.to_string()));
     }
-    let mut made = std::mem::take(&mut raw.notes);
+    let (mut made, entries) = (std::mem::take(&mut raw.notes), std::mem::take(&mut raw.entries));
     let flies = Flying { bridged_s: raw.bridged_s(), ..options.flies };
-    let mut channels = channels(&raw, &options.mapping);
+    let mut channels = channels(&raw, &options.mapping, &entries);
     let stretches = raw.stretches(&options.flies);
     if let Some(stretches) = &stretches {
         findings.push(Finding::note(stretches.said()));
@@ -74,16 +78,15 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
     made.extend(derive::apply(&mut raw.rows, &options.mapping));
     findings.extend(assess::channels(&channels, &raw.rows, &flies));
     if !timeless {
-        findings.extend(screening::screened(&mut raw.rows, &flies));
+        let found = screening::screened(&mut raw.rows, &flies);
+        findings.extend(found.into_iter().map(|f| named(f, &entries, Format::Csv)));
     }
     findings.extend(made.iter().map(Finding::note));
     let reading = match lacking {
         true => csv::keep_all(raw, path),
         false => settled(raw, path, options, to, &mut findings)?,
     };
-    if reading.cut_short {
-        findings.push(Finding::warning("the file ends in the middle of a row, which is left out"));
-    }
+    findings.extend(reading.cut_short.then(|| Finding::warning(CUT_SHORT)));
     if !several && !reading.unknown_columns.is_empty() {
         let names = reading.unknown_columns.join(", ");
         findings.push(Finding::note(format!("columns that the log format does not name: {names}")));
@@ -94,6 +97,7 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
     Ok(Log {
         format: Format::Csv,
         channels,
+        entries,
         topics: Vec::new(),
         flight: Flight { sensors, notes, ..reading.flight },
         dropped: reading.dropped,
@@ -153,7 +157,7 @@ fn lacks(path: &Path, missing: &[CsvError], unknown: &[String]) -> Finding {
 }
 
 /// A channel for each column of the table that has values.
-fn channels(raw: &Raw, mapping: &Mapping) -> Vec<Channel> {
+fn channels(raw: &Raw, mapping: &Mapping, entries: &BTreeMap<String, Entry>) -> Vec<Channel> {
     let mut seen = vec![[Vec::new(), Vec::new()]; COLUMNS.len()];
     for block in raw.rows.chunks(BLOCK) {
         for ([times, values], (_, get, _)) in seen.iter_mut().zip(COLUMNS).skip(1) {
@@ -172,7 +176,7 @@ fn channels(raw: &Raw, mapping: &Mapping) -> Vec<Channel> {
         }
         (!times.is_empty()).then(|| Channel {
             columns: vec![name.to_owned()],
-            origin: mapping.origin(name),
+            origin: mapping.origin(name, entries.get(name)),
             samples: times.len(),
             rate_hz: if period > 0.0 { 1.0 / period } else { 0.0 },
             largest_gap_s: times.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max),

@@ -3,7 +3,7 @@
 
 use greylag_sitl::plant::PlantOptions;
 
-use crate::imagined::{Block, Ended, STEPS, Stepped, WIDTH, outside};
+use crate::imagined::{Block, Ended, STEPS, Stepped, Validity, WIDTH};
 use crate::targets::Stratified;
 use crate::world::World;
 use crate::{Environment, Simulator, Trouble};
@@ -11,11 +11,12 @@ use greylag_control::policy::{ACTIONS, OBSERVATIONS, command, observe};
 use greylag_control::task::Task;
 use greylag_control::{Observation, Target};
 use greylag_num::{Lanes, Real};
-use greylag_physics::State;
+use greylag_physics::{Airframe, State};
 
 /// One aircraft in JSBSim as a training environment. Each episode has one target attitude.
 pub struct Flown {
     simulator: Simulator,
+    validity: Validity,
     seen: Observation,
     target: Target,
     targets: Stratified,
@@ -24,16 +25,22 @@ pub struct Flown {
 }
 
 impl Flown {
-    /// An aircraft in its initial state. Its target is the next one of `targets`.
+    /// An aircraft in its initial state. Its target is the next one of `targets`. The envelope in `airframe` determines at
+    /// which airspeeds the aircraft counts as lost.
     ///
     /// # Errors
     ///
     /// If JSBSim cannot load the aircraft or reset it.
-    pub fn new(plant: &PlantOptions, targets: Stratified) -> Result<Flown, Trouble> {
+    pub fn new(
+        plant: &PlantOptions,
+        airframe: &Airframe,
+        targets: Stratified,
+    ) -> Result<Flown, Trouble> {
         let mut simulator = Simulator::new(plant)?;
         let seen = simulator.reset()?;
         let target = Target { roll: 0.0, pitch: 0.0, airspeed: State::NEUTRAL.airspeed };
-        let mut flown = Flown { simulator, seen, target, targets, step: 0, lost: 0 };
+        let validity = Validity::of(airframe);
+        let mut flown = Flown { simulator, validity, seen, target, targets, step: 0, lost: 0 };
         flown.begin()?;
         Ok(flown)
     }
@@ -65,7 +72,7 @@ impl World for Flown {
         let left = match self.simulator.step(command(action.map(|x| x.0[0].into()))) {
             Ok(seen) => {
                 self.seen = seen;
-                outside(&seen.state.map(Lanes::from_f64)).0[0] > 0.0
+                self.validity.outside(&seen.state.map(Lanes::from_f64)).0[0] > 0.0
             }
             Err(_) => true,
         };

@@ -12,7 +12,7 @@ use greylag_model::{GreyBox, Memory};
 use greylag_num::{ROW, Real};
 use greylag_physics::actuators::Actuators;
 use greylag_physics::inputs::InputMemory;
-use greylag_physics::{Controls, State};
+use greylag_physics::{Airframe, Controls, State};
 
 /// Number of aircraft in a block, one per SIMD lane.
 pub const WIDTH: usize = ROW;
@@ -20,16 +20,19 @@ pub const WIDTH: usize = ROW;
 /// Number of steps of an episode, 10 ms each. Episodes in JSBSim have the same number.
 pub const STEPS: u32 = 1000;
 
-/// Validity limits of the model. An episode ends when |θ|, |α| or |β| (rad), |p|, |q| or |r| (rad/s) exceeds its limit, or when
-/// the airspeed (m/s) leaves its range.
-const ENVELOPE: Envelope =
-    Envelope { pitch: 1.48, incidence: 1.0, rate: 25.0, airspeed: [4.0, 60.0] };
+/// Largest |θ| of a model's validity, rad.
+const PITCH: f64 = 1.48;
+/// Largest |α| and |β|, rad.
+const INCIDENCE: f64 = 1.0;
+/// Largest |p|, |q| and |r|, rad/s.
+const RATE: f64 = 25.0;
+/// Smallest and largest airspeed as fractions of the smallest and the largest airspeed of the aircraft's envelope: 4 and
+/// 60 m/s for the X8, with which the shipped policies were trained.
+const AIRSPEED: [f64; 2] = [4.0 / 13.0, 4.0 / 3.0];
 
+/// Validity limits of an aircraft's model. An episode ends when a state exceeds them.
 #[derive(Clone, Copy, Debug)]
-struct Envelope {
-    pitch: f64,
-    incidence: f64,
-    rate: f64,
+pub struct Validity {
     airspeed: [f64; 2],
 }
 
@@ -63,6 +66,7 @@ pub struct Stepped {
 #[derive(Clone, Debug)]
 pub struct Imagination {
     model: Arc<GreyBox>,
+    validity: Validity,
     task: Task,
     instances: usize,
     batches: Vec<Batch>,
@@ -104,6 +108,7 @@ impl Imagination {
         };
         let count = instances.div_ceil(WIDTH);
         let mut imagination = Imagination {
+            validity: Validity::of(&model.airframe),
             model,
             task: Task::PAPER,
             instances,
@@ -161,7 +166,8 @@ impl Imagination {
     /// Simulates one step of a block under `action`. Ended episodes are reset afterwards.
     pub fn step(&mut self, block: usize, action: &[Block; ACTIONS]) -> Stepped {
         let batch = &mut self.batches[block];
-        let (observed, reward, outside) = batch.advance(&self.model, &self.task, action);
+        let (observed, reward, outside) =
+            batch.advance(&self.model, &self.validity, &self.task, action);
         let mut ended = [Ended::No; WIDTH];
         let mut anew = Block::zero();
         for (lane, (steps, how)) in batch.step.iter_mut().zip(&mut ended).enumerate() {
@@ -205,6 +211,7 @@ impl Batch {
     fn advance(
         &mut self,
         model: &GreyBox,
+        validity: &Validity,
         task: &Task,
         action: &[Block; ACTIONS],
     ) -> ([Block; OBSERVATIONS], Block, Block) {
@@ -222,7 +229,7 @@ impl Batch {
         }
         self.actuators.step(&command(limited), figures);
         let seen = observe(&self.state, &self.actuators.observed(figures), &self.target);
-        (seen, task.reward(&self.state, &self.target), outside(&self.state))
+        (seen, task.reward(&self.state, &self.target), validity.outside(&self.state))
     }
 }
 
@@ -235,26 +242,25 @@ fn wrapped(roll: Block) -> Block {
     Block::where_less(roll, -half, roll + turn, roll)
 }
 
-/// 1 where a state is outside the validity limits or not finite, else 0.
-#[inline(always)]
-pub fn outside(state: &State<Block>) -> Block {
-    ENVELOPE.left(state)
-}
+impl Validity {
+    /// Limits of the model of an aircraft with `airframe`.
+    pub fn of(airframe: &Airframe) -> Validity {
+        let ([slow, fast], envelope) = (AIRSPEED, &airframe.envelope);
+        Validity { airspeed: [slow * envelope.airspeed_min_mps, fast * envelope.airspeed_max_mps] }
+    }
 
-/// Smallest and largest value of each state within the validity limits: rad, rad/s, m/s.
-pub fn bounds() -> [State; 2] {
-    let Envelope { pitch, incidence, rate, airspeed: [slow, fast] } = ENVELOPE;
-    let roll = std::f64::consts::PI;
-    let most = [roll, pitch, fast, rate, rate, rate, incidence, incidence];
-    let mut least = most.map(|x| -x);
-    least[2] = slow;
-    [State::from_array(least), State::from_array(most)]
-}
+    /// Smallest and largest value of each state within the limits: rad, rad/s, m/s.
+    pub fn bounds(&self) -> [State; 2] {
+        let ([slow, fast], roll) = (self.airspeed, std::f64::consts::PI);
+        let most = [roll, PITCH, fast, RATE, RATE, RATE, INCIDENCE, INCIDENCE];
+        let mut least = most.map(|x| -x);
+        least[2] = slow;
+        [State::from_array(least), State::from_array(most)]
+    }
 
-impl Envelope {
     /// 1 where a state is outside the limits or not finite, else 0.
     #[inline(always)]
-    fn left(&self, s: &State<Block>) -> Block {
+    pub fn outside(&self, s: &State<Block>) -> Block {
         let inside = |x: Block, most: f64, others: Block| {
             // a comparison with NaN is false
             Block::where_less(x.abs(), Block::from_f64(most), others, Block::zero())
@@ -262,13 +268,13 @@ impl Envelope {
         let [slow, fast] = self.airspeed;
         let middle = Block::from_f64(0.5 * (slow + fast));
         let mut all = Block::from_f64(1.0);
-        all = inside(s.pitch, self.pitch, all);
+        all = inside(s.pitch, PITCH, all);
         all = inside(s.airspeed - middle, 0.5 * (fast - slow), all);
-        all = inside(s.alpha, self.incidence, all);
-        all = inside(s.beta, self.incidence, all);
-        all = inside(s.p, self.rate, all);
-        all = inside(s.q, self.rate, all);
-        all = inside(s.r, self.rate, all);
+        all = inside(s.alpha, INCIDENCE, all);
+        all = inside(s.beta, INCIDENCE, all);
+        all = inside(s.p, RATE, all);
+        all = inside(s.q, RATE, all);
+        all = inside(s.r, RATE, all);
         all = inside(s.roll, 10.0, all);
         Block::from_f64(1.0) - all
     }

@@ -134,9 +134,14 @@ pub enum WorkbenchError {
     Present(String),
     /// The logs are read with a mapping file of the user, which the workbench does not change.
     #[error(
-        "the logs are read by a mapping of your own; add this line to its [columns] and start again: {0}"
+        "the logs are read by a mapping of your own; add to its [columns] and start again: {0}"
     )]
     MappingGiven(String),
+    /// No factor in a mapping corrects this column.
+    #[error(
+        "{0} does not come from a single field of this log, so that no factor in a mapping corrects it: state what the outputs drive in the airframe file, or name another field in a mapping"
+    )]
+    Computed(String),
     /// The mapping file of the session, which assigns log fields to columns, is invalid.
     #[error("cannot add to the mapping {}: it is not a mapping; correct or remove it", .0.display())]
     NoMapping(PathBuf),

@@ -385,6 +385,26 @@ fn a_planner_without_its_policy_is_refused() {
     assert!(matches!(refused, Err(SetupError::Untrained)));
 }
 
+/// Without an LQI or a policy, nothing flies where no plan is made.
+#[test]
+fn a_setting_that_a_planner_cannot_use_is_refused() {
+    let model = model();
+    let build = |kind: ControllerKind, change: &str| {
+        let changes = [change.parse().unwrap()];
+        let source = Source { model: &model, agent: None, changes: &changes };
+        control::build(kind, source).map(|planner| planner.name())
+    };
+    let settings = ["trust=0.5", "known=1", "margin=0.1", "ilqr=yes"];
+    for kind in [ControllerKind::Cem, ControllerKind::Mppi] {
+        for setting in settings {
+            let said = build(kind, setting).unwrap_err().to_string();
+            assert!(said.contains(setting) && said.contains("hybrid-lqi"), "{said}");
+        }
+        assert!(build(kind, "trust=none").is_ok() && build(kind, "disturbance=0.3").is_ok());
+    }
+    assert!(settings.iter().all(|setting| build(ControllerKind::HybridLqi, setting).is_ok()));
+}
+
 #[test]
 fn a_policy_without_critics_flies_alone_and_proposes_but_does_not_value() {
     let model = model();

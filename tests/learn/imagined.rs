@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use greylag::model::GreyBox;
 use greylag::num::Real;
-use greylag::physics::Command;
-use greylag::sim::imagined::{Block, Ended, Imagination, STEPS};
+use greylag::physics::{Airframe, Command, State};
+use greylag::sim::imagined::{Block, Ended, Imagination, STEPS, Validity};
 use greylag::sim::targets::Stratified;
 use greylag::sim::{Environment, Imagined};
 
@@ -95,4 +95,23 @@ fn aircraft_that_leave_the_envelope_are_lost_alone_and_counted() {
     }
     assert!(lost > 0);
     assert_eq!(world.episodes(), [16 + lost, lost]);
+}
+
+/// The airspeeds at which an episode ends are those of the aircraft: a C172 flies up to 60 m/s and dives beyond, an indoor
+/// aircraft flies from 5 m/s.
+#[test]
+fn an_aircraft_is_lost_at_airspeeds_of_its_own() {
+    let params = Path::new(env!("CARGO_MANIFEST_DIR")).join("params");
+    let validity = |aircraft: &str| {
+        let file = params.join(aircraft).join("airframe.toml");
+        Validity::of(&Airframe::load(&file).unwrap())
+    };
+    let lost = |aircraft: &str, airspeed: f64| {
+        let state = State { airspeed, ..State::NEUTRAL }.map(Block::from_f64);
+        validity(aircraft).outside(&state).0[0] > 0.0
+    };
+    // the limits of the trainings of the shipped policies
+    assert_eq!(validity("x8").bounds().map(|s| s.airspeed), [4.0, 60.0]);
+    assert!(lost("x8", 65.0) && !lost("c172p", 65.0) && lost("c172p", 85.0));
+    assert!(lost("x8", 3.0) && !lost("a430", 3.0) && lost("a430", 1.0));
 }

@@ -6,9 +6,11 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use crate::lacking_support::flown;
+use greylag::model::{FlightConstants, Known};
 use greylag::physics::formula::{Status, file, register};
 use greylag::sim::missing::Missing;
 use greylag::sysid::diagnose::{DiagnoseError, Options, Proposal, Verdict, propose, trend};
+use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use greylag::sysid::progress::{Stage, ignore_progress};
 
 /// Seed of the flights; none of those that thresholds were set with.
@@ -35,6 +37,42 @@ fn a_thrust_line_to_the_left_is_named_and_tested() {
     let own = file::parse(&found.effect.unwrap()).unwrap();
     assert_eq!(own.status, Status::Proposed);
     // the interval of the amendment with the true effect is ±0.002; a search tunes less
+    assert!((own.values[0] - 1.16).abs() < 0.05, "{:?}", own.values);
+}
+
+/// The same thrust line with a pitot tube that reads 5 % high and a vane that reads 0.03 rad high, as the model's file states.
+#[test]
+fn errors_of_the_installation_in_the_models_file_are_removed_first() {
+    let params = Path::new(env!("CARGO_MANIFEST_DIR")).join("params");
+    let effect = register::load(&params.join("effects/yaw_by_throttle.toml")).unwrap()[0];
+    let (mut model, search, test) = flown(Missing::written(effect, &[1.16]).unwrap(), SEED);
+    let (share, alpha) = (0.05, 0.03);
+    let installation = FlightConstants {
+        sensors: Some([share, 0.0, 0.0, 0.0, alpha, 0.0]),
+        ..FlightConstants::default()
+    };
+    model.known = Known { installation: Some(installation), ..Known::default() }.into();
+    let misread = |flight: &Reconstruction| {
+        let mut flight = flight.clone();
+        for at in flight.segments.iter_mut().flat_map(|s| &mut s.instants) {
+            // the file states a fraction of the reading
+            at.state.airspeed /= 1.0 - share;
+            at.state.alpha += alpha;
+        }
+        flight
+    };
+    let [search, test] =
+        [&search[2..], &test[..]].map(|all| all.iter().map(misread).collect::<Vec<_>>());
+    let options = Options {
+        without: vec!["thrust_line_sideways".into()],
+        free_forms: false,
+        ..Options::default()
+    };
+    let found = propose(&model, &search, &test, &options, &ignore_progress).unwrap();
+    assert!(found.notes[0].contains("as the model's file has them"), "{:?}", found.notes);
+    let chosen = found.front.iter().find(|r| r.chosen).unwrap();
+    assert_eq!(chosen.formula, "yaw = k*throttle", "{:?}", found.sentences);
+    let own = file::parse(&found.effect.unwrap()).unwrap();
     assert!((own.values[0] - 1.16).abs() < 0.05, "{:?}", own.values);
 }
 

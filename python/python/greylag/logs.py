@@ -31,8 +31,9 @@ def mat_to_csv(
     """Write the signals of a MATLAB file to the CSV ``out``, one row per sample, and return the names of its columns.
 
     A signal is a numeric vector. A vector in a struct has a dotted name: ``flight.imu.p``, or ``imu[0].p`` in an array of
-    structs. A matrix with N rows has N samples of the signals ``q[0]``, ``q[1]``, … Files of versions 4 to 7 need scipy.
-    Files of version 7.3 and other HDF5 files need h5py.
+    structs. A matrix has its samples along its longer dimension (along its rows if it is square): an N×4 and a 4×N matrix
+    both have N samples of the signals ``q[0]`` to ``q[3]``. Files of versions 4 to 7 need scipy. Files of version 7.3 and
+    other HDF5 files need h5py.
 
     ``names`` maps the columns of the CSV to signals: ``{"time_s": "flight.t", "roll_rad": "flight.att[0]"}``. Without
     ``names``, the most frequent length of the signals is determined, and all signals of this length are written under
@@ -107,8 +108,9 @@ def _flatten(name: str, value: Any, signals: dict[str, np.ndarray], left_out: di
     elif value.ndim == 1 or sorted(value.shape)[-2] == 1:
         signals[name] = value.reshape(-1).astype(float)
     elif value.ndim == 2:
-        for i in range(value.shape[1]):
-            signals[f"{name}[{i}]"] = value[:, i].astype(float)
+        samples = value if value.shape[0] >= value.shape[1] else value.T
+        for i in range(samples.shape[1]):
+            signals[f"{name}[{i}]"] = samples[:, i].astype(float)
     else:
         left_out[name] = f"an array of {value.ndim} dimensions"
 

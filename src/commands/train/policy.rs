@@ -298,7 +298,8 @@ impl Arguments {
             #[cfg(feature = "demo")]
             None => {
                 let plant = greylag_sitl::plant::PlantOptions::default();
-                run.train(recipe, crate::sim::flown::Flown::new(&plant, targets)?)
+                let airframe = &ground.airframe;
+                run.train(recipe, crate::sim::flown::Flown::new(&plant, airframe, targets)?)
             }
             #[cfg(not(feature = "demo"))]
             None => Err(anyhow::anyhow!("this program was built without JSBSim")),

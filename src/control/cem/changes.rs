@@ -6,6 +6,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use super::Aids;
 use super::rollout::{HORIZON, WIDTH};
 use super::settings::{Instructions, Settings, Start, Update, Value};
 
@@ -85,6 +86,22 @@ impl Change {
             Change::Known(known) => Settings { known, ..s },
             Change::Instructions(instructions) => Settings { instructions, ..s },
             Change::Cores(cores) => Settings { cores, ..s },
+        }
+    }
+
+    /// Names what a planner with `aids` would need for the change to have an effect; `None` if it has one. A setting that is
+    /// switched off is never missing anything.
+    pub(crate) fn lacks(self, aids: &Aids) -> Option<&'static str> {
+        match self {
+            Change::Trust(Some(_)) | Change::Known(Some(_))
+                if aids.base.is_none() && aids.agent.is_none() =>
+            {
+                Some("LQI or policy that flies where no plan is made")
+            }
+            Change::Margin(_) | Change::Ilqr(true) if aids.base.is_none() => {
+                Some("LQI as its base controller")
+            }
+            _ => None,
         }
     }
 }

@@ -103,16 +103,16 @@ impl Limits {
     pub(super) fn outside(&self, track: &Track) -> OutsideS {
         let mut total = OutsideS::default();
         for (moment, before, length) in track.ticks() {
-            let moved = before.map_or(0.0, |old| {
+            let slew = before.map_or(0.0, |(old, since)| {
                 let new = &moment.command;
                 let by = [
                     new.aileron - old.aileron,
                     new.elevator - old.elevator,
                     new.rudder - old.rudder,
                 ];
-                by.iter().fold(0.0, |most: f64, by| most.max(by.abs()))
+                by.iter().fold(0.0, |most: f64, by| most.max(by.abs())) / since
             });
-            total.add(self.beyond(moment, moved / length), length);
+            total.add(self.beyond(moment, slew), length);
         }
         total
     }

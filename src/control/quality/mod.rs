@@ -63,6 +63,9 @@ impl Moment {
     }
 }
 
+/// The previous command, and the time since it, s.
+type Earlier<'a> = (&'a Command, f64);
+
 /// A flight towards one target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
@@ -224,19 +227,23 @@ impl Track {
         away.map_or(0.0, |k| self.moments[k].time_s - start) + self.lost_s
     }
 
-    /// The ticks (sample intervals): every sample except the last, with the previous command and the time to the next sample,
-    /// s.
-    fn ticks(&self) -> impl Iterator<Item = (&Moment, Option<&Command>, f64)> {
-        let before = std::iter::once(self.before.as_ref());
-        let before = before.chain(self.moments.iter().map(|m| Some(&m.command)));
-        let pairs = self.moments.windows(2).zip(before);
-        pairs.map(|(pair, before)| (&pair[0], before, pair[1].time_s - pair[0].time_s))
+    /// The ticks (sample intervals): every sample except the last, with the previous command and the time since it, s, and with
+    /// the time to the next sample, s. The time since [`Track::before`] is not known; the time to the next sample stands for it.
+    fn ticks(&self) -> impl Iterator<Item = (&Moment, Option<Earlier<'_>>, f64)> {
+        self.moments.windows(2).enumerate().map(move |(k, pair)| {
+            let length = pair[1].time_s - pair[0].time_s;
+            let before = match k.checked_sub(1).map(|k| &self.moments[k]) {
+                Some(old) => Some((&old.command, pair[0].time_s - old.time_s)),
+                None => self.before.as_ref().map(|command| (command, length)),
+            };
+            (&pair[0], before, length)
+        })
     }
 
-    /// Changes of a command, each with the time to the next sample, s.
+    /// Changes of a command, each with the time since the previous command, s.
     fn changes(&self, of: fn(&Command) -> f64) -> impl Iterator<Item = (f64, f64)> + '_ {
-        let changed = move |(m, before, length): (&Moment, Option<&Command>, f64)| {
-            before.map(|old| (of(&m.command) - of(old), length))
+        let changed = move |(m, before, _): (&Moment, Option<Earlier<'_>>, f64)| {
+            before.map(|(old, since)| (of(&m.command) - of(old), since))
         };
         self.ticks().filter_map(changed).filter(|(by, _)| by.is_finite())
     }

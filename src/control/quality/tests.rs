@@ -135,6 +135,20 @@ fn the_first_change_counts_from_the_command_before() {
     assert!((after.outside_s.slew - STEP).abs() < 1e-9);
 }
 
+/// The aileron moves at 15 per second, within the limit of 20. A sample that was not recorded doubles the change between its
+/// neighbours and the time between them.
+#[test]
+fn a_missing_sample_makes_no_rate() {
+    let mut flight = track(0.1, [0.0; 2], |t| {
+        let command = Command { aileron: 15.0 * t - 0.75, ..Command::IDLE };
+        Moment { command, ..level(t) }
+    });
+    flight.moments.remove(4);
+    let q = flight.quality(&LIMITS);
+    assert_eq!(q.outside_s.slew, 0.0);
+    assert!((q.mean_square_rate.aileron - 225.0).abs() < 1e-6, "{q:?}");
+}
+
 /// The load factor 1 + 2 sin is above 2 for a third of each period and never below −1.
 #[test]
 fn seconds_outside_are_those_of_the_sine_above_the_limit() {

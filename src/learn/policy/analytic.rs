@@ -8,6 +8,8 @@
 
 mod slopes;
 
+use std::ops::Range;
+
 use burn::tensor::{Device, Tensor, TensorData};
 use rayon::prelude::*;
 
@@ -20,6 +22,10 @@ use greylag_num::{Dense, stream};
 use greylag_physics::{ActuatorState, Command, Controls, State};
 use greylag_sim::targets::Stratified;
 use slopes::{Aircraft, Flyer, INPUTS, NUMBERS, Step, observation_slopes};
+
+/// Airspeeds between which an aircraft is not lost, as fractions of the smallest and the largest airspeed of its envelope: 5 and
+/// 60 m/s for the X8, with which the shipped policies were trained.
+const AIRSPEED: [f64; 2] = [5.0 / 13.0, 4.0 / 3.0];
 
 /// Settings of the training.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -99,6 +105,8 @@ pub struct AnalyticTrainer {
     recipe: AnalyticRecipe,
     /// The models to which the aircraft are assigned in turn.
     models: Vec<GreyBox>,
+    /// Airspeeds outside of which an aircraft is lost, m/s.
+    airspeeds: Range<f64>,
     device: Device,
     actor: Mlp,
     optimiser: Optimiser,
@@ -141,6 +149,8 @@ impl AnalyticTrainer {
                 Instance { aircraft: neutral, target: targets.next_target(), left }
             })
             .collect();
+        let ([slow, fast], envelope) = (AIRSPEED, &model.airframe.envelope);
+        let airspeeds = slow * envelope.airspeed_min_mps..fast * envelope.airspeed_max_mps;
         let models = match recipe.draws {
             0 => vec![model],
             draws => (0..draws).map(|k| model.drawn(recipe.seed, k)).collect(),
@@ -149,6 +159,7 @@ impl AnalyticTrainer {
             optimiser: Optimiser::new(&actor, recipe.rate),
             recipe,
             models,
+            airspeeds,
             device,
             actor,
             targets,
@@ -229,7 +240,7 @@ impl AnalyticTrainer {
     fn advance(&mut self, k: usize, next: Aircraft) -> bool {
         let State { pitch, airspeed, alpha, beta, p, q, r, .. } = next.state;
         let inside = pitch.abs() < 1.4
-            && (5.0..60.0).contains(&airspeed)
+            && self.airspeeds.contains(&airspeed)
             && alpha.abs() < 0.8
             && beta.abs() < 0.8
             && [p, q, r].iter().all(|x| x.abs() < 20.0);

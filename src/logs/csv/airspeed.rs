@@ -8,7 +8,7 @@ use crate::Sample;
 ///
 /// Airspeed and density may be in different rows, so the last logged density is used. Without a logged density, the
 /// standard atmosphere gives the density at the last logged altitude, or at sea level.
-pub(super) fn make_true(rows: &mut [Sample]) -> String {
+pub(crate) fn make_true(rows: &mut [Sample]) -> String {
     let (mut density, mut altitude) = (f64::NAN, f64::NAN);
     let mut by = [0usize; 3];
     for row in rows {

@@ -1,6 +1,7 @@
 //! The header of a CSV table. It states which field of a row (a value of the file) fills which column of Greylag's log format.
 //! This file also parses the fields' numbers.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::CsvError;
@@ -70,6 +71,7 @@ impl Head {
         let table = Raw {
             missing,
             unknown_columns: unknown.filter(|n| !n.is_empty() && !dialect.reads(n)).collect(),
+            entries: entries(names, mapping, &dialect),
             notes: dialect.said().into_iter().chain(lacking(names, mapping)).collect(),
             ..Raw::default()
         };
@@ -225,6 +227,22 @@ fn targets(name: &str, mapping: &Mapping, dialect: &Dialect) -> Vec<Target> {
     targets
 }
 
+/// The entry of a mapping file for each column that a single field fills.
+fn entries(names: &[String], mapping: &Mapping, dialect: &Dialect) -> BTreeMap<String, Entry> {
+    let same = |column: &str| {
+        names.iter().any(|name| name == column).then(|| Entry::scaled(TEXT, column, 1.0))
+    };
+    let under_other_name = |column: &str| {
+        let found = dialect.found.iter().find(|f| f.column == column)?;
+        Some(Entry { offset: found.offset, ..Entry::scaled(TEXT, &found.field, found.scale) })
+    };
+    let entry = |column: &str| {
+        let own = mapping.get(column).cloned();
+        own.or_else(|| same(column)).or_else(|| under_other_name(column))
+    };
+    COLUMNS.iter().filter_map(|c| Some((c.0.to_owned(), entry(c.0)?))).collect()
+}
+
 /// A note on the fields that the mapping file names and the table does not have; `None` if it has all.
 fn lacking(names: &[String], mapping: &Mapping) -> Option<String> {
     let lacks = |field: &String| !names.contains(field);
@@ -281,6 +299,19 @@ mod tests {
         let missing: Vec<String> = table.missing.iter().map(CsvError::to_string).collect();
         let missing = missing.join("\n");
         assert!(missing.contains("`roll_rad`") && missing.contains("from csv.tas"), "{missing}");
+    }
+
+    #[test]
+    fn a_column_has_the_entry_of_its_field_in_the_file() {
+        let mapping = "schema = 1\n[columns]\nalpha_rad = { from = \"csv.aoa\", scale = 2.0 }\n";
+        let mapping = Mapping::parse(mapping, Path::new("m.toml")).unwrap();
+        let names = ["time_s", "Phi (deg)", "aoa", "q_radps", "q0"].map(str::to_owned);
+        let (_, table) = Head::of(&names, b',', Path::new("t.csv"), &mapping);
+        let of = |column: &str| table.entries.get(column).map(|e| (e.field.as_str(), e.scale));
+        assert_eq!(of("roll_rad"), Some(("Phi (deg)", 1_f64.to_radians())));
+        assert_eq!(of("alpha_rad"), Some(("aoa", 2.0)));
+        assert_eq!(of("q_radps"), Some(("q_radps", 1.0)));
+        assert_eq!(of("pitch_rad"), None);
     }
 
     #[test]

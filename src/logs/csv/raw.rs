@@ -1,6 +1,7 @@
 //! A CSV table as read from its file, before unusable rows are dropped. Of a long table, an inspection keeps only stretches of
 //! rows, with statistics of the whole table.
 
+use std::collections::BTreeMap;
 use std::io::BufRead;
 use std::path::Path;
 
@@ -13,7 +14,7 @@ use super::records::{Fields, Records};
 use super::thin::{STRETCH, Thin, Whole};
 use crate::Channel;
 use crate::columns::index;
-use crate::mapping::Mapping;
+use crate::mapping::{Entry, Mapping};
 use crate::phases::Flying;
 use crate::quality::frozen_of;
 use crate::stretches::{Keep, Stretches};
@@ -32,6 +33,8 @@ pub(crate) struct Raw {
     /// One error for each required column that the table lacks.
     pub missing: Vec<CsvError>,
     pub(crate) unknown_columns: Vec<String>,
+    /// For each column that a single column of the file fills: the entry of a mapping file that fills it in the same way.
+    pub entries: BTreeMap<String, Entry>,
     pub(super) cut_short: bool,
     /// Notes for the user, for instance on columns that were found under other names.
     pub notes: Vec<String>,
@@ -154,6 +157,7 @@ impl Raw {
                 unreadable: unreadable.copied().collect(),
                 missing: Vec::new(),
                 unknown_columns: self.unknown_columns.clone(),
+                entries: self.entries.clone(),
                 cut_short: self.cut_short && k == last,
                 notes: self.notes.clone(),
                 whole: None,

@@ -43,7 +43,7 @@ pub use board::Board;
 use greylag_physics::Sensors;
 use greylag_physics::mixer::Mixer;
 use greylag_physics::sensors::CONSTANTS;
-use rule::Rule;
+use rule::{Fill, Rule, Shape, Term};
 use written::{Written, WrittenFlight, entry, over, thresholds, turn};
 
 /// Topic name of the columns of a CSV file in a mapping.
@@ -85,6 +85,43 @@ pub struct Entry {
     pub instance: Option<u16>,
     /// If the column is the rate of change of the field: time span of the fitted cubic, s. Otherwise `None`.
     pub rate_over_s: Option<f64>,
+}
+
+impl Entry {
+    /// The entry for the field `field` of `topic` times `scale`.
+    pub(super) fn scaled(topic: &str, field: &str, scale: f64) -> Entry {
+        let (topic, field) = (topic.to_owned(), field.to_owned());
+        Entry { topic, field, scale, offset: 0.0, instance: None, rate_over_s: None }
+    }
+
+    /// The entry that fills a column as `rule` does from the instance `instance` of its topic. `None` if the rule does more than
+    /// scale one field and add a constant.
+    pub(super) fn of(rule: &Rule, instance: u16) -> Option<Entry> {
+        let Fill::Sum { terms, offset, .. } = &rule.fill else { return None };
+        let [Term { field, gain, shape: Shape::Linear }] = &terms[..] else { return None };
+        let instance = (instance != 0).then_some(instance);
+        Some(Entry { offset: *offset, instance, ..Entry::scaled(&rule.topic, field, *gain) })
+    }
+
+    /// Text of the entry in a mapping file for logs of `format`, with the column multiplied by `factor`.
+    pub fn times(&self, factor: f64, format: Format) -> String {
+        let from = toml::Value::from(format!("{}.{}", self.topic, self.field));
+        let mut text = format!("{{ from = {from}, scale = {}", self.scale * factor);
+        if self.offset != 0.0 {
+            text += &format!(", offset = {}", self.offset * factor);
+        }
+        text += &match self.instance.map(|instance| (instance.to_be_bytes(), instance)) {
+            None => String::new(),
+            Some(([system, component], _)) if format == Format::Tlog => {
+                format!(", instance = \"{system}/{component}\"")
+            }
+            Some((_, number)) => format!(", instance = {number}"),
+        };
+        if let Some(time) = self.rate_over_s {
+            text += &format!(", rate_over_s = {time}");
+        }
+        text + " }"
+    }
 }
 
 /// A user's mapping, with the mixer that assigns the autopilot's outputs to surfaces and motors.
@@ -197,9 +234,10 @@ impl Mapping {
         self.entries.iter().filter_map(|(column, e)| Some((column.as_str(), e.rate_over_s?)))
     }
 
-    /// Text that names the source of a column of a CSV table: a column of the file, or what it is computed from.
-    pub(super) fn origin(&self, column: &str) -> String {
-        match self.get(column) {
+    /// Text that names the source of a column of a CSV table: a column of the file, or what it is computed from. `entry` is the
+    /// column's entry if a single column of the file fills it.
+    pub(super) fn origin(&self, column: &str, entry: Option<&Entry>) -> String {
+        match entry {
             Some(e) if e.rate_over_s.is_some() => format!("rate of {}", e.field),
             Some(e) => e.field.clone(),
             None if self.makes(column) && derive::RATES.contains(&column) => "attitude".into(),
@@ -234,6 +272,16 @@ impl Mapping {
     /// The entry for `column`, if the mapping has one.
     pub fn get(&self, column: &str) -> Option<&Entry> {
         self.entries.get(column)
+    }
+
+    /// The `entries` of a log's columns, with those of the mapping in place of the reader's own.
+    pub(super) fn over(&self, mut entries: BTreeMap<String, Entry>) -> BTreeMap<String, Entry> {
+        for (column, entry) in &mut entries {
+            if let Some(own) = self.get(column) {
+                entry.clone_from(own);
+            }
+        }
+        entries
     }
 
     /// The entries of a topic, with their columns.

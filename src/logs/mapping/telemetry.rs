@@ -42,8 +42,13 @@ const DEFLECTION: f64 = 0.5235;
 pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
     let Some(vehicle) = vehicle(topics) else { return Vec::new() };
     let system = vehicle.to_be_bytes()[0];
+    // outputs of a real autopilot are pulses, in another order than that of the sitl profile; it sends HIL_ACTUATOR_CONTROLS to a
+    // simulator only
+    let real = autopilots(topics, system).any(|a| EQUIVALENT.contains(&a));
     let mut out = states();
-    out.extend(deflections(topics, system));
+    if !real {
+        out.extend(deflections(topics, system));
+    }
     out.push(airspeed(topics, system));
     for rule in &mut out {
         // if this component does not send a message, another component of the same system is used
@@ -58,15 +63,13 @@ pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
         ("elevator_cmd", "controls1"),
         ("throttle_cmd", "controls2"),
     ];
-    // A real autopilot sends HIL_ACTUATOR_CONTROLS to a simulator only, and with another order of channels.
-    let real = autopilots(topics, system).any(|a| EQUIVALENT.contains(&a));
     for (column, field) in of_sitl.into_iter().filter(|_| !real) {
         commands.push(
             Rule::linear(column, "HIL_ACTUATOR_CONTROLS", field, 1.0)
                 .noting("commands are HIL_ACTUATOR_CONTROLS in the order of the sitl profile"),
         );
     }
-    if sent_travel(topics, system).is_some_and(|[.., rudder]| rudder > 0.0) {
+    if !real && sent_travel(topics, system).is_some_and(|[.., rudder]| rudder > 0.0) {
         commands.push(Rule::linear("rudder_cmd", "HIL_ACTUATOR_CONTROLS", "controls3", 1.0));
     }
     commands.extend(servos::rules(topics, "SERVO_OUTPUT_RAW", mixer, |n| format!("servo{n}_raw")));
@@ -184,4 +187,29 @@ fn sent_travel(topics: &Topics, system: u8) -> Option<[f64; 3]> {
     let rudder =
         if active >= 15.0 { last("actuator11")?.abs().max(last("actuator14")?.abs()) } else { 0.0 };
     (active >= 7.0).then_some([last("actuator5")?, last("actuator6")?, rudder])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stretches::Keep;
+
+    #[test]
+    fn outputs_of_a_real_autopilot_are_no_deflections() {
+        let reads = |autopilot: f64| {
+            let mut topics = Topics { system: Some(1), ..Topics::default() };
+            for (name, field, value) in [
+                ("HEARTBEAT", "autopilot", autopilot),
+                ("ATTITUDE", "roll", 0.0),
+                ("ACTUATOR_OUTPUT_STATUS", "actuator0", 1500.0),
+            ] {
+                let mut topic = Topic::new([field], Keep::All);
+                topic.push(0.0, &[value]);
+                topics.topics.insert((name.to_owned(), 0x0101), topic);
+            }
+            rules(&topics, None).iter().any(|rule| rule.topic == "ACTUATOR_OUTPUT_STATUS")
+        };
+        // 8 is that of a simulator, 3 and 12 are those of ArduPilot and PX4
+        assert_eq!([8.0, 3.0, 12.0].map(reads), [true, false, false]);
+    }
 }

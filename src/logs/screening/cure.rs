@@ -6,12 +6,6 @@ use crate::Sample;
 use crate::columns::{COLUMNS, index};
 use crate::finding::{Cure, Finding};
 
-/// Groups of columns to which one correction of a unit applies. A finding names the first column of a group.
-const LIKEWISE: [&[&str]; 3] = [
-    &["roll_rad", "pitch_rad", "yaw_rad"],
-    &["p_radps", "q_radps", "r_radps"],
-    &["ax_mps2", "ay_mps2", "az_mps2"],
-];
 /// Text between the defect and its correction in a finding.
 const BETWEEN: &str = ": ";
 
@@ -41,10 +35,7 @@ pub fn tried(
 
 /// A copy of `rows` to which the correction `cure` is applied.
 fn mended(rows: &[Sample], cure: &Cure) -> Vec<Sample> {
-    let group = LIKEWISE.iter().find(|group| group[0] == cure.column && cure.scale > 0.0);
-    let own = [cure.column.as_str()];
-    let columns: Vec<usize> =
-        group.copied().unwrap_or(&own).iter().filter_map(|column| index(column)).collect();
+    let columns: Vec<usize> = cure.columns().into_iter().filter_map(index).collect();
     let mut rows = rows.to_vec();
     for row in &mut rows {
         columns.iter().for_each(|i| *COLUMNS[*i].2(row) *= cure.scale);

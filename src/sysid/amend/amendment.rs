@@ -19,7 +19,8 @@ use super::{answer, parameters, story};
 use crate::compare::{Answer, HorizonScore};
 use crate::diagnose::Candidate;
 use crate::flight_path::reconstruction::{Reconstruction, Segment};
-use crate::per_flight::{PerFlight, known};
+use crate::per_flight::PerFlight;
+use crate::per_flight::known::{Corrected, corrected};
 use crate::progress::Progress;
 use crate::rudder;
 use greylag_model::GreyBox;
@@ -164,8 +165,9 @@ pub fn amend(
         joined(&mut model.clone(), added)?;
     }
     let seen = answer::seen(flights, held_out);
-    let Right { flights, asked, notes } = right(model, flights, options.per_flight);
-    let options = Options { per_flight: asked, ..options.clone() };
+    let Corrected { flights, per_flight, notes } =
+        corrected(&model.known, flights, options.per_flight);
+    let options = Options { per_flight, ..options.clone() };
     let mut amended = of_right(model, &flights, held_out, &options, progress)?;
     amended.amendment.answer = answer::answer(&amended.amendment, seen);
     amended.amendment.notes.extend(notes);
@@ -250,40 +252,6 @@ fn compared_at(prior: Prior, given: &[HorizonScore]) -> Option<f64> {
         // without a prior the given coefficients are only guesses, so a horizon that a single run reaches is allowed
         Prior::Bounds => judge::judged_at(given),
     }
-}
-
-/// The flights for the fit after correction with the constants in the model's file, the constants `asked` that are estimated for
-/// each flight, and notes on both.
-struct Right {
-    flights: Vec<Reconstruction>,
-    asked: PerFlight,
-    notes: Vec<String>,
-}
-
-/// Corrects `flights` for the sensor errors and the misalignment of the sensor axes that the file of `model` states. They are not
-/// corrected if the fit estimates the misalignment. If the file states trims for any of `flights`, trims are estimated for every
-/// flight.
-fn right(model: &GreyBox, flights: &[Reconstruction], mut asked: PerFlight) -> Right {
-    let mut notes = Vec::new();
-    let (flights, named) = match asked.askew_deg {
-        Some(_) => (flights.to_vec(), Vec::new()),
-        None => known::put_right(&model.known, flights),
-    };
-    if !named.is_empty() {
-        notes.push(format!(
-            "Axes and sensors are used as the model's file has them: {}.",
-            named.join(", ")
-        ));
-    }
-    let trimmed = known::trimmed(&model.known, &flights);
-    if !trimmed.is_empty() && asked.trims.is_none() {
-        asked.trims = Some(1.0);
-        notes.push(format!(
-            "The model's file has trims of {}, so each flight is given trims of its own, as by --flight-trims.",
-            trimmed.join(", ")
-        ));
-    }
-    Right { flights, asked, notes }
 }
 
 /// Adds the effect `added` to `model` at its starting values.

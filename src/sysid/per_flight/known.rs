@@ -7,7 +7,7 @@ use greylag_physics::State;
 
 use crate::flight_path::reconstruction::{Instant, Reconstruction};
 use crate::per_flight::askew::{self, Turning};
-use crate::per_flight::trims;
+use crate::per_flight::{PerFlight, trims};
 use crate::weak_form::prepared::Prepared;
 
 /// For each sensor error, the index of the state that it changes. The error of the airspeed is a fraction of the airspeed.
@@ -108,23 +108,40 @@ pub fn put_right(known: &Known, flights: &[Reconstruction]) -> (Vec<Reconstructi
     (right, named)
 }
 
-/// Names of those `flights` for which `known` has trims.
-pub fn trimmed<'a>(known: &Known, flights: &'a [Reconstruction]) -> Vec<&'a str> {
-    let has = |f: &&Reconstruction| known.of(&f.name).is_some_and(|own| own.trims.is_some());
-    flights.iter().filter(has).map(|f| f.name.as_str()).collect()
+/// Flights after correction with the constants in a model's file.
+#[derive(Clone, Debug)]
+pub struct Corrected {
+    /// The flights in body axes, with the sensor errors removed.
+    pub flights: Vec<Reconstruction>,
+    /// The constants to be estimated for each flight. They include trims if the file has trims for any of the flights.
+    pub per_flight: PerFlight,
+    /// Notes on what was used of the file.
+    pub notes: Vec<String>,
 }
 
-/// A note that a search for missing effects ignores the constants in `known`, with the names of the `flights` that have such
-/// constants. `None` if none has.
-pub fn not_used(known: &Known, flights: &[&Reconstruction]) -> Option<String> {
-    let has = |f: &&&Reconstruction| known.of(&f.name).is_some();
-    let names: Vec<&str> = flights.iter().filter(has).map(|f| f.name.as_str()).collect();
-    (!names.is_empty()).then(|| {
-        format!(
-            "The model's file has constants of {}, which this search does not use: a formula may stand for them.",
-            names.join(", ")
-        )
-    })
+/// Corrects `flights` for the misalignment of the axes and the sensor errors in `known`, for a regression or a fit that estimates
+/// the constants `asked` for each flight. If it estimates the misalignment, the flights are not corrected. If `known` has trims
+/// for any of `flights`, trims are estimated for every flight.
+pub fn corrected(known: &Known, flights: &[Reconstruction], asked: PerFlight) -> Corrected {
+    let (mut per_flight, mut notes) = (asked, Vec::new());
+    let (flights, named) = match asked.askew_deg {
+        Some(_) => (flights.to_vec(), Vec::new()),
+        None => put_right(known, flights),
+    };
+    if !named.is_empty() {
+        let names = named.join(", ");
+        notes.push(format!("Axes and sensors are used as the model's file has them: {names}."));
+    }
+    let has = |f: &&Reconstruction| known.of(&f.name).is_some_and(|own| own.trims.is_some());
+    let trimmed: Vec<&str> = flights.iter().filter(has).map(|f| f.name.as_str()).collect();
+    if !trimmed.is_empty() && asked.trims.is_none() {
+        per_flight.trims = Some(1.0);
+        notes.push(format!(
+            "The model's file has trims of {}, so each flight is given trims of its own.",
+            trimmed.join(", ")
+        ));
+    }
+    Corrected { flights, per_flight, notes }
 }
 
 #[cfg(test)]
@@ -132,19 +149,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn constants_that_a_search_does_not_use_are_noted() {
-        let [a, b] = ["a.csv", "b.csv"].map(Reconstruction::empty);
-        let constants = FlightConstants {
-            source: String::new(),
-            axes_deg: None,
+    fn a_file_with_trims_of_one_flight_has_trims_estimated_for_all() {
+        let flights = ["a.csv", "b.csv"].map(Reconstruction::empty);
+        let own = FlightConstants {
             trims: Some([0.0; trims::TRIMS.len()]),
-            sensors: None,
+            ..FlightConstants::default()
         };
         let mut known = Known::default();
-        assert_eq!(not_used(&known, &[&a, &b]), None);
-        known.flights.insert("b.csv".into(), constants);
-        let said = not_used(&known, &[&a, &b]).unwrap();
-        assert!(said.starts_with("The model's file has constants of b.csv, which"), "{said}");
+        let none = corrected(&known, &flights, PerFlight::default());
+        assert_eq!((none.per_flight, none.notes.len()), (PerFlight::default(), 0));
+        known.flights.insert("b.csv".into(), own);
+        let with = corrected(&known, &flights, PerFlight::default());
+        assert_eq!(with.per_flight.trims, Some(1.0));
+        assert!(with.notes[0].contains("has trims of b.csv, so"), "{:?}", with.notes);
     }
 
     #[test]

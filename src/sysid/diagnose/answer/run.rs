@@ -24,7 +24,7 @@ use crate::diagnose::search::excitation;
 use crate::diagnose::search::round::Problem;
 use crate::diagnose::search::stepwise::{Found, search};
 use crate::flight_path::reconstruction::Reconstruction;
-use crate::per_flight::known::{put_right, trimmed};
+use crate::per_flight::known::{Corrected, corrected};
 use crate::progress::{Progress, report};
 use crate::rudder;
 use crate::weak_form::prepared::Prepared;
@@ -59,26 +59,13 @@ pub fn diagnose(
     if model.known.is_empty() {
         return of_unknown(model, flights, options, progress);
     }
-    let (right, named) = match options.per_flight.askew_deg {
-        Some(_) => (flights.to_vec(), Vec::new()),
-        None => put_right(&model.known, flights),
-    };
-    let (mut bare, mut options, mut said) = (model.clone(), options.clone(), Vec::new());
+    let Corrected { flights, per_flight, notes } =
+        corrected(&model.known, flights, options.per_flight);
+    let mut bare = model.clone();
     bare.known = Default::default();
-    if !named.is_empty() {
-        let names = named.join(", ");
-        said.push(format!("Axes and sensors are used as the model's file has them: {names}."));
-    }
-    let trimmed = trimmed(&model.known, flights);
-    if !trimmed.is_empty() && options.per_flight.trims.is_none() {
-        options.per_flight.trims = Some(1.0);
-        said.push(format!(
-            "The model's file has trims of {}, so each flight is given trims of its own.",
-            trimmed.join(", ")
-        ));
-    }
-    let mut diagnosis = of_unknown(&bare, &right, &options, progress)?;
-    diagnosis.notes.splice(0..0, said);
+    let options = Options { per_flight, ..options.clone() };
+    let mut diagnosis = of_unknown(&bare, &flights, &options, progress)?;
+    diagnosis.notes.splice(0..0, notes);
     Ok(diagnosis)
 }
 

@@ -17,7 +17,7 @@ use crate::diagnose::search::round::Round;
 use crate::diagnose::search::stepwise::{Found, search};
 use crate::diagnose::{DiagnoseError, Options, Verdict};
 use crate::flight_path::reconstruction::Reconstruction;
-use crate::per_flight::known::not_used;
+use crate::per_flight::known::corrected;
 use crate::progress::{Progress, part, report};
 use crate::rudder;
 use greylag_model::{GreyBox, RUDDER};
@@ -31,12 +31,30 @@ const FREE: [f64; 2] = [0.6, 0.9];
 const TESTED: f64 = 0.9;
 
 /// Diagnoses `model` on `flights`. If the diagnosis finds that something is missing that the catalogue cannot explain, a
-/// formula is searched for on `flights` and tested on `held_out`. Constants of single flights in the model's file are not
-/// used. `progress` receives the stages and may cancel.
+/// formula is searched for on `flights` and tested on `held_out`. Constants of the installation and of flights in the model's
+/// file are used as in a diagnosis. `progress` receives the stages and may cancel.
 ///
 /// # Errors
 /// The same as [`diagnose`](crate::diagnose::diagnose).
 pub fn propose(
+    model: &GreyBox,
+    flights: &[Reconstruction],
+    held_out: &[Reconstruction],
+    options: &Options,
+    progress: &Progress,
+) -> Result<Proposal, DiagnoseError> {
+    let right = corrected(&model.known, &[flights, held_out].concat(), options.per_flight);
+    let (search, test) = right.flights.split_at(flights.len());
+    let mut bare = model.clone();
+    bare.known = Default::default();
+    let options = Options { per_flight: right.per_flight, ..options.clone() };
+    let mut proposal = of_corrected(&bare, search, test, &options, progress)?;
+    proposal.notes.splice(0..0, right.notes);
+    Ok(proposal)
+}
+
+/// The proposal for flights that are already corrected. The file of `model` has no constants of flights.
+fn of_corrected(
     model: &GreyBox,
     flights: &[Reconstruction],
     held_out: &[Reconstruction],
@@ -50,7 +68,6 @@ pub fn propose(
     // errors in the held-out flights are reported before the search, which takes minutes
     let (test, used, more) = self::problem(model, held_out, options)?;
     notes.extend(more);
-    notes.extend(not_used(&model.known, &[&searched_on[..], &used[..]].concat()));
     notes.extend(excitation::check(&test.flights)?);
     let mut found = search(&problem, model, options, &part(progress, [0.0, SEARCHED]))?;
     let rudder = rudder::unmodelled(flights, model).or(rudder::unmodelled(held_out, model));

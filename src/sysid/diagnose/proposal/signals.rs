@@ -8,6 +8,7 @@ use crate::diagnose::answer::run::problem;
 use crate::diagnose::search::round::Round;
 use crate::diagnose::{DiagnoseError, Options};
 use crate::flight_path::reconstruction::Reconstruction;
+use crate::per_flight::known::corrected;
 use greylag_model::GreyBox;
 use greylag_physics::formula::file::channel_name;
 
@@ -27,8 +28,10 @@ pub fn signals(
     options: &Options,
 ) -> Result<String, DiagnoseError> {
     let unusable = || DiagnoseError::Unusable { model: model.name.clone() };
-    let (problem, used, _) = problem(model, flights, options)?;
-    let numbers = numbers(&used, flights);
+    let right = corrected(&model.known, flights, options.per_flight);
+    let options = Options { per_flight: right.per_flight, ..options.clone() };
+    let (problem, used, _) = problem(model, &right.flights, &options)?;
+    let numbers = numbers(&used, &right.flights);
     let tuned = Round::new(&problem, model.clone(), &[]).ok_or_else(unusable)?.tuned();
     let round = Round::new(&problem, tuned, &[]).ok_or_else(unusable)?;
     let left = round.tuned_residual();
