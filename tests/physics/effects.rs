@@ -72,7 +72,8 @@ fn every_id_of_the_catalogue_is_there() {
                aeroelastic_loss actuator_lag time_delay dead_zone backlash rate_limit air_density \
                mass_error inertia_xz asymmetry dihedral_alpha roll_control_alpha \
                effectiveness_saturation ground_effect steady_wind alpha_bias beta_bias airspeed_scale \
-               imu_bias clock_skew external_load servo_aileron servo_elevator"
+               imu_bias clock_skew external_load servo_aileron servo_elevator servo_aileron_curve \
+               servo_elevator_curve"
         .split_whitespace()
     {
         assert!(ids.contains(&id), "{id}");
@@ -351,6 +352,53 @@ fn a_servo_changes_its_own_surface() {
     let out = inputs::Kind::ServoElevator.act(0.5, &mut past, lanes);
     for (k, y) in out.0.into_iter().enumerate() {
         let exact: f32 = if k % 2 == 0 { 0.15 } else { -0.05 };
+        assert!((y - exact).abs() < 1e-6, "lane {k}: {y}");
+    }
+}
+
+/// The gain is 1 + c |δ|, alike on both sides of neutral; a servo remembers nothing.
+#[test]
+fn servos_curve_changes_the_gain_with_deflection() {
+    for kind in [inputs::Kind::ServoElevatorCurve, inputs::Kind::ServoAileronCurve] {
+        let input = [-0.3, 0.2, 0.0, -0.1, 0.3];
+        let out = response(kind, 0.5, &input);
+        for (y, exact) in out.iter().zip([-0.345, 0.22, 0.0, -0.105, 0.345]) {
+            assert!((y - exact).abs() < 1e-15, "{y} for {exact}");
+        }
+        assert_eq!(response(kind, 0.0, &input), input, "c = 0 changes nothing");
+        let backwards: Vec<f64> = input.iter().rev().copied().collect();
+        let mut turned = response(kind, 0.5, &backwards);
+        turned.reverse();
+        assert_eq!(turned, out, "the order of the inputs does not matter");
+        // linear in c, with the slope δ |δ|
+        let less = response(kind, -0.5, &input);
+        for ((a, b), u) in less.iter().zip(&out).zip(input) {
+            assert!((b - a - u * u.abs()).abs() < 1e-15);
+        }
+        let about = kind.describe();
+        assert_eq!((about.shape, about.entry.unwrap().starts.len()), (0, 0), "{}", about.id);
+    }
+}
+
+/// Each curve changes its own surface, all SIMD lanes by their own deflection.
+#[test]
+fn a_servos_curve_changes_its_own_surface() {
+    let acting = |id: &str| {
+        let mut model = model("prior");
+        model.join(id, &[0.5]).unwrap();
+        model.act(&CONTROLS, &mut inputs::InputMemory::at_rest(&CONTROLS, [0.0; 2]))
+    };
+    // aileron 0.2, elevator −0.1
+    let (aileron, elevator) = (acting("servo_aileron_curve"), acting("servo_elevator_curve"));
+    assert!((aileron.aileron - 0.22).abs() < 1e-15, "{}", aileron.aileron);
+    assert_eq!(Controls { aileron: CONTROLS.aileron, ..aileron }, CONTROLS);
+    assert!((elevator.elevator + 0.105).abs() < 1e-15, "{}", elevator.elevator);
+    assert_eq!(Controls { elevator: CONTROLS.elevator, ..elevator }, CONTROLS);
+    let lanes = Lanes::<16>(std::array::from_fn(|k| if k % 2 == 0 { 0.1 } else { -0.2 }));
+    let mut past = Past::at_rest(lanes);
+    let out = inputs::Kind::ServoElevatorCurve.act(0.5, &mut past, lanes);
+    for (k, y) in out.0.into_iter().enumerate() {
+        let exact: f32 = if k % 2 == 0 { 0.105 } else { -0.22 };
         assert!((y - exact).abs() < 1e-6, "lane {k}: {y}");
     }
 }

@@ -157,7 +157,7 @@ pub fn rate_on_turning_earth(model: &GreyBox, truth: &Truth, acting: &Controls) 
 
 /// Amplitudes several times what two minutes of flight show, so that an error of the formula cannot
 /// hide in the tolerance.
-pub const AMPLITUDES: [(&str, f64); 27] = [
+pub const AMPLITUDES: [(&str, f64); 29] = [
     ("drag_alpha2", 1.5),
     ("drag_beta2", 0.7),
     ("drag_elevator_abs", 0.3),
@@ -179,6 +179,8 @@ pub const AMPLITUDES: [(&str, f64); 27] = [
     ("rate_limit", 0.5),
     ("servo_aileron", -0.2),
     ("servo_elevator", 0.3),
+    ("servo_aileron_curve", -0.6),
+    ("servo_elevator_curve", 1.0),
     ("mass_error", 0.25),
     ("inertia_xz", 0.3),
     ("asymmetry", 0.004),

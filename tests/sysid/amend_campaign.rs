@@ -47,6 +47,8 @@ const CASES: &[Case] = &[
     ("rate_limit", 1.0, &[1.0], &[1.0]),
     ("servo_elevator", 0.2, &[0.0], &[0.2]),
     ("servo_aileron", -0.2, &[0.0], &[-0.2]),
+    ("servo_elevator_curve", 0.5, &[0.0], &[0.5]),
+    ("servo_aileron_curve", -0.5, &[0.0], &[-0.5]),
     ("lift_stall", f64::NAN, &[1.0, 0.2, 50.0], &[f64::NAN, f64::NAN]),
 ];
 

@@ -125,6 +125,13 @@ fn a_servo_with_another_gain_on_each_side_is_named() {
     found("servo_aileron", -0.1, 0.1, 12);
 }
 
+/// At 0.3 rad the gain is 9 % more or less than at neutral, as that of the error `servo` of tests/truth/installed.py.
+#[test]
+fn a_servo_whose_gain_changes_with_deflection_is_named() {
+    found("servo_elevator_curve", 0.3, 0.25, 13);
+    found("servo_aileron_curve", -0.3, 0.25, 14);
+}
+
 #[test]
 fn a_rudder_that_moves_is_said_first_and_nothing_is_asserted_where_it_acts() {
     // doublets of ± 4.1° and 2 s: their sd is their amplitude

@@ -252,6 +252,8 @@ def act(kind, amount, past, now, before, h):
         return before + min(max(u - before, -amount * h), amount * h)
     if kind == 7 or kind == 8:  # a gain of 1 + amount on the positive side, of 1 - amount on the other
         return u + amount * abs(u)
+    if kind == 9 or kind == 10:  # a gain of 1 + amount times the deflection's size
+        return u * (1.0 + amount * abs(u))
     return u
 
 
@@ -301,8 +303,8 @@ def integrate(x, wanted, e, kind, amount, matrix, truth, commands):
                 now += 1
                 past_a[now % HISTORY], past_e[now % HISTORY] = clipped(surface_a[0]), clipped(surface_e[0])
                 # a wrong servo is that of one surface
-                acting_a = act(0 if kind == 8 else kind, amount, past_a, now, acting_a, h)
-                acting_e = act(0 if kind == 7 else kind, amount, past_e, now, acting_e, h)
+                acting_a = act(0 if kind == 8 or kind == 10 else kind, amount, past_a, now, acting_a, h)
+                acting_e = act(0 if kind == 7 or kind == 9 else kind, amount, past_e, now, acting_e, h)
                 if lags:  # as the lag of the thrust
                     target = (acting_a, acting_e, throttle)[lagged_of]
                     slope = (target - acted[lagged_of]) / h

@@ -34,6 +34,8 @@ AMPLITUDES = {
     "thrust_lag": (0.2, 0.6, False),
     "servo_aileron": (0.1, 0.2, True),
     "servo_elevator": (0.1, 0.2, True),
+    "servo_aileron_curve": (0.3, 0.6, True),
+    "servo_elevator_curve": (0.3, 0.6, True),
 }
 """Smallest and largest amplitude, and whether it may as well be negative.
 
@@ -69,6 +71,8 @@ PARAMETERS = {
     "thrust_lag": {"tau_s": 1.0},
     "servo_aileron": {"k": 1.0},
     "servo_elevator": {"k": 1.0},
+    "servo_aileron_curve": {"c": 1.0},
+    "servo_elevator_curve": {"c": 1.0},
 }
 """The parameters in which the catalogue has a hidden effect, each as a multiple of the amplitude.
 
@@ -78,8 +82,12 @@ wrong themselves. Of `lift_stall` only `alpha0_rad` is compared, and of `officia
 
 INPUTS = (
     "actuator_lag", "time_delay", "dead_zone", "backlash", "rate_limit", "thrust_lag", "servo_aileron", "servo_elevator",
+    "servo_aileron_curve", "servo_elevator_curve",
 )  # fmt: skip
 """Effects on what the surfaces, or of `thrust_lag` the engine, do with their measured position."""
+
+BY_NAME = ("servo_aileron_curve", "servo_elevator_curve")
+"""Effects that `make_cases.py --both` draws only if they are named: a seed draws what it drew before they were added."""
 
 TAKEN_OUT = {"drag_beta2": "drag_beta2", "drag_elevator_abs": "drag_elevator_abs", "lift_stall": "lift_table"}
 """What a model loses so that it lacks the effect, where the aircraft has it of its own."""

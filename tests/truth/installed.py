@@ -13,8 +13,12 @@ NAMED = {
     "airspeed_lag": "clock_skew", "velocity_late": "clock_skew",
 }  # fmt: skip
 """What `greylag diagnose` calls each error of a sensor."""
-SERVO = ("servo_aileron", "servo_elevator")
-"""What it calls an aileron or an elevator that turns further than recorded on one side: an effect on the inputs."""
+SERVO = {
+    "servo_sides": ("servo_aileron", "servo_elevator"),
+    "servo": ("servo_aileron_curve", "servo_elevator_curve"),
+}
+"""What it calls a wrong servo of aileron or elevator, an effect on the inputs: one that turns further than recorded on one
+side, and one whose gain changes with deflection. The equal gain of `servo` is one of the model's derivatives."""
 KINDS = (*NAMED, "frozen", "servo", "gusts", "servo_sides")
 """All errors. Those without a name have none in the program's list."""
 LATE = 0.02
@@ -47,7 +51,7 @@ SIGNED = ("tilt", "gyro_gain", "force_gain", "vane_gain", "servo", "servo_sides"
 
 def name_of(kind, error):
     """What `greylag diagnose` calls an error; None if it has no name."""
-    return SERVO[error["axis"] % 2] if kind == "servo_sides" else NAMED.get(kind)
+    return SERVO[kind][error["axis"] % 2] if kind in SERVO else NAMED.get(kind)
 
 
 def gusty(wind, gust, steps, period, random):

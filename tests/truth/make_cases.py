@@ -149,8 +149,9 @@ def kinds_of_errors(text, truth):
     return kinds or sys.exit("--errors: only the official truths fly through gusts")
 
 
-def beside_errors(count, truth, seed, effects):
-    """`count` cases, each with an effect drawn from `effects`."""
+def beside_errors(count, truth, seed, text):
+    """`count` cases, each with an effect drawn from those of `--effects`."""
+    effects = [x for x in chosen(text) if text != "all" or x not in hidden.BY_NAME]
     if count and not effects:
         sys.exit("--both: name effects from which one is drawn for each case")
     cases = [f"{truth}-both-{k:02}" for k in range(count)]
@@ -205,7 +206,7 @@ def main():
     errors = (kinds_of_errors(a.errors, a.truth), a.installed)
     effects = a.effects if a.effects is not None else "" if a.formulas or a.lagged else "all"
     cases = [(f"{a.truth}-null-{k:02}", None) for k in range(a.nulls)]
-    cases += beside_errors(a.both, a.truth, a.seed, chosen(effects)) if a.both else [(f"{a.truth}-{e}", e) for e in chosen(effects)]
+    cases += beside_errors(a.both, a.truth, a.seed, effects) if a.both else [(f"{a.truth}-{e}", e) for e in chosen(effects)]
     cases += [(f"{a.truth}-formula-{k:02}", FORMULA) for k in range(a.formulas)]
     cases += [(f"{a.truth}-lagged-{k:02}", LAGGED) for k in range(a.lagged)]
     for case, effect in cases:

@@ -85,9 +85,10 @@ class Document:
                 ET.SubElement(element, tag, attributes).text = repr(value)
             self.read_instead(surface, f"truth/{surface}")
 
-    def scale(self, factor, axes=("DRAG", "SIDE", "LIFT", "ROLL", "PITCH", "YAW")):
-        """Multiplies both positions by `factor(position)` where they act."""
-        for surface, position in POSITIONS.items():
+    def scale(self, factor, axes=("DRAG", "SIDE", "LIFT", "ROLL", "PITCH", "YAW"), surfaces=tuple(POSITIONS)):
+        """Multiplies the positions of `surfaces` by `factor(position)` where they act."""
+        for surface in surfaces:
+            position = POSITIONS[surface]
             function = ET.Element("function", name=f"truth/{surface}")
             function.append(product(position, factor(position)))
             self.read_instead(surface, f"truth/{surface}", axes)
@@ -180,6 +181,15 @@ def servo(surface):
     return write
 
 
+def curve(surface):
+    """A surface whose gain is 1 + a times the size of its deflection."""
+
+    def factor(position, a):
+        return operation("sum", 1.0, product(a, operation("abs", position)))
+
+    return lambda d, a: d.scale(lambda position: factor(position, a), surfaces=(surface,))
+
+
 def along_alpha(*others):
     """A rolling moment by alpha times other properties."""
     return lambda d, a: d.add("ROLL", "roll", product(*QS, "metrics/bw-ft", a, "aero/alpha-rad", *others))
@@ -210,6 +220,8 @@ WRITE = {
     "rate_limit": lambda d, a: d.pass_through("actuator", [("rate_limit", {}, a)]),
     "servo_aileron": servo("aileron"),
     "servo_elevator": servo("elevator"),
+    "servo_aileron_curve": curve("aileron"),
+    "servo_elevator_curve": curve("elevator"),
     "mass_error": lambda d, a: d.set("mass_balance/emptywt", lambda m: m * (1.0 + a)),
     # JSBSim's ixz is -Jxz
     "inertia_xz": lambda d, a: d.set("mass_balance/ixz", lambda i: i - a / TORQUE),

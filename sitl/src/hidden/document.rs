@@ -1,6 +1,6 @@
 //! Edits the XML of an aircraft to write hidden effects into it.
 
-use super::expression::{product, property, sum, value};
+use super::expression::{INPUT, product, property, sum, value};
 use super::{FilterKind, HiddenError};
 use crate::plant::Properties;
 
@@ -156,13 +156,15 @@ impl<'a> Document<'a> {
         self.pass_each([(component, settings); 2]);
     }
 
-    /// The same with components of their own, each with its settings, for aileron and elevator in this order.
+    /// The same with components of their own, each with its settings, for aileron and elevator in this order. [`INPUT`] in the
+    /// settings stands for the property of the deflection that comes in.
     pub(super) fn pass_each(&mut self, components: [(&str, &str); 2]) {
         for (surface, (component, settings)) in SURFACES.into_iter().zip(components) {
             let (input, name) = (
                 self.passed_name(surface, self.passed),
                 self.passed_name(surface, self.passed + 1),
             );
+            let settings = settings.replace(INPUT, &input);
             self.components += &format!(
                 "<{component} name=\"{name}\"><input>{input}</input>{settings}</{component}>\n"
             );

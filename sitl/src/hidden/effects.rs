@@ -2,7 +2,7 @@
 
 use super::Effect;
 use super::document::{Axis, Surface};
-use super::expression::{abs, product, property, sum, value};
+use super::expression::{INPUT, abs, product, property, sum, value};
 
 /// Newtons per pound of force.
 const LBF: f64 = 4.448_221_615_260_5;
@@ -19,7 +19,7 @@ const ANY: f64 = 1e3;
 const LARGE: f64 = 1e7;
 
 /// The catalogue of hidden effects.
-pub static EFFECTS: [Effect; 27] = [
+pub static EFFECTS: [Effect; 29] = [
     Effect {
         id: "drag_alpha2",
         formula: "drag Q a α², in addition to the drag table",
@@ -229,6 +229,26 @@ pub static EFFECTS: [Effect; 27] = [
         },
     },
     Effect {
+        id: "servo_aileron_curve",
+        formula: "the aileron acts as δa (1 + a |δa|)",
+        unit: "1/rad",
+        bounds: (-2.0, 2.0),
+        write: |d, a| {
+            d.pass_each([("fcs_function", curve(a).as_str()), UNCHANGED]);
+            Ok(())
+        },
+    },
+    Effect {
+        id: "servo_elevator_curve",
+        formula: "the elevator acts as δe (1 + a |δe|)",
+        unit: "1/rad",
+        bounds: (-2.0, 2.0),
+        write: |d, a| {
+            d.pass_each([UNCHANGED, ("fcs_function", curve(a).as_str())]);
+            Ok(())
+        },
+    },
+    Effect {
         id: "mass_error",
         formula: "empty mass × (1 + a), inertias as they are",
         unit: "",
@@ -294,6 +314,12 @@ const UNCHANGED: (&str, &str) = ("pure_gain", "<gain>1</gain>");
 fn sides(a: f64) -> String {
     let ends = |min: f64, max: f64| format!("<min>{min}</min><max>{max}</max>");
     format!("<domain>{}</domain><range>{}</range>", ends(-1.0, 1.0), ends(a - 1.0, 1.0 + a))
+}
+
+/// Settings of a component that has the gain 1 + a |input|: JSBSim multiplies the function of an `fcs_function` by its input.
+fn curve(a: f64) -> String {
+    let gain = sum(&[value(1.0), product(&[value(a), abs(property(INPUT))])]);
+    format!("<function>{gain}</function>")
 }
 
 fn alpha() -> String {

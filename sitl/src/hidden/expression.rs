@@ -1,5 +1,8 @@
 //! Builds expressions of JSBSim's functions as XML text.
 
+/// Placeholder that stands in the settings of a flight-control component for the property of its input.
+pub(super) const INPUT: &str = "{input}";
+
 /// A reference to the JSBSim property `name`: `<property>name</property>`.
 pub(super) fn property(name: &str) -> String {
     format!("<property>{name}</property>")

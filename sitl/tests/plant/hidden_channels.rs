@@ -193,6 +193,13 @@ fn effects_on_the_surfaces_act_in_every_channel_the_surfaces_act_in() {
         let (before, after) = (t.elevator_rad, t.elevator_rad + 0.3 * t.elevator_rad.abs());
         of_deflections(q, 0.0, after - before, after.abs() - before.abs())
     });
+    acts("servo_aileron_curve=0.6", 1, |_, t, q| {
+        of_deflections(q, 0.6 * t.aileron_rad * t.aileron_rad.abs(), 0.0, 0.0)
+    });
+    acts("servo_elevator_curve=-0.6", 1, |_, t, q| {
+        let (before, after) = (t.elevator_rad, t.elevator_rad * (1.0 - 0.6 * t.elevator_rad.abs()));
+        of_deflections(q, 0.0, after - before, after.abs() - before.abs())
+    });
     acts("roll_control_alpha=-0.6", 1, |_, t, q| Loads {
         l: q * S * B * -0.6 * t.alpha_rad * t.aileron_rad,
         ..Loads::NONE

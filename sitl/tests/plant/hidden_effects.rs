@@ -79,6 +79,33 @@ fn a_servos_gain_depends_on_the_side() {
     }
 }
 
+#[test]
+fn a_servos_gain_changes_with_deflection() {
+    for (effect, of_elevator, c) in
+        [("servo_elevator_curve=0.6", true, 0.6), ("servo_aileron_curve=-0.5", false, -0.5)]
+    {
+        let mut hidden = plant_with(&[effect]);
+        let mut sides = [false; 2];
+        for step in 0..200 {
+            let command = if (step / 40) % 2 == 0 { 0.5 } else { -0.5 };
+            let truth =
+                hidden.step(Inputs { elevator: command, aileron: command, ..IDLE }).unwrap();
+            let mut acts =
+                ["elevator", "aileron"].map(|s| hidden.property(&format!("hidden/{s}-1")).unwrap());
+            let mut moves = [truth.elevator_rad, truth.aileron_rad];
+            if !of_elevator {
+                acts.reverse();
+                moves.reverse();
+            }
+            let curved = moves[0] * (1.0 + c * moves[0].abs());
+            assert!((acts[0] - curved).abs() < 1e-12, "{effect}, step {step}: {acts:?}");
+            assert_eq!(acts[1], moves[1], "{effect}, step {step}");
+            sides[usize::from(moves[0] > 0.0)] |= moves[0].abs() > 0.05;
+        }
+        assert_eq!(sides, [true; 2], "{effect}: the surface moves to both sides");
+    }
+}
+
 /// An amplitude within the bounds at which a flight of 3 s stays finite.
 fn mild(id: &str) -> f64 {
     match id {

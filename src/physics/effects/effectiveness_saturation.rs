@@ -18,7 +18,13 @@ impl Effect for EffectivenessSaturation {
     const NEEDS: Needs = Needs::Parts;
     const ENTRY: Option<Entry> = Some(Entry {
         channels: &[Channel::Roll, Channel::Pitch],
-        look_alikes: &["dead_zone", "roll_linear.Clda", "pitch_linear.Cmde"],
+        look_alikes: &[
+            "dead_zone",
+            "servo_aileron_curve",
+            "servo_elevator_curve",
+            "roll_linear.Clda",
+            "pitch_linear.Cmde",
+        ],
         separated_by: "large against small steps of aileron and elevator",
         example: &[-2.0],
         starts: &[],

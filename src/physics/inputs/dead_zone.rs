@@ -17,7 +17,12 @@ impl InputEffect for DeadZone {
         &[coefficient("halfwidth_rad", "half the width of the zone", "rad", (0.0, 0.3))];
     const ENTRY: Entry = Entry {
         channels: &[],
-        look_alikes: &["effectiveness_saturation", "backlash"],
+        look_alikes: &[
+            "effectiveness_saturation",
+            "backlash",
+            "servo_aileron_curve",
+            "servo_elevator_curve",
+        ],
         separated_by: "small against large doublets",
         example: &[0.02],
         starts: &[&[0.005], &[0.01], &[0.02], &[0.04], &[0.08]],

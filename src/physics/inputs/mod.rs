@@ -205,4 +205,6 @@ inputs! {
     thrust_lag::ThrustLag,
     servo_aileron::ServoAileron,
     servo_elevator::ServoElevator,
+    servo_aileron_curve::ServoAileronCurve,
+    servo_elevator_curve::ServoElevatorCurve,
 }

@@ -23,7 +23,12 @@ impl InputEffect for ServoAileron {
     )];
     const ENTRY: Entry = Entry {
         channels: &[],
-        look_alikes: &["roll_linear.Clda", "asymmetry", "effectiveness_saturation"],
+        look_alikes: &[
+            "roll_linear.Clda",
+            "asymmetry",
+            "effectiveness_saturation",
+            "servo_aileron_curve",
+        ],
         separated_by: "aileron doublets to both sides of neutral: an asymmetry acts without them too",
         example: &[0.2],
         starts: &[],

@@ -21,7 +21,12 @@ impl InputEffect for ServoElevator {
         &[coefficient("k", "half the difference of the gains, down minus up", "", (-0.5, 0.5))];
     const ENTRY: Entry = Entry {
         channels: &[],
-        look_alikes: &["pitch_linear.Cmde", "drag_elevator_abs", "effectiveness_saturation"],
+        look_alikes: &[
+            "pitch_linear.Cmde",
+            "drag_elevator_abs",
+            "effectiveness_saturation",
+            "servo_elevator_curve",
+        ],
         separated_by: "elevator doublets to both sides of neutral: on one side alone it is a gain",
         example: &[0.2],
         starts: &[],

@@ -61,9 +61,13 @@ pub const KINDS: [MissingKind; 26] = [
     kind("thrust_lag", "s", [0.2, 0.6]),
 ];
 
-/// Wrong servos, whose gain depends on the side of neutral. They can be missing if they are asked for.
-pub const SERVOS: [MissingKind; 2] =
-    [both("servo_aileron", "", [0.1, 0.2]), both("servo_elevator", "", [0.1, 0.2])];
+/// Wrong servos, whose gain depends on the side of neutral or changes with deflection. They can be missing if they are asked for.
+pub const SERVOS: [MissingKind; 4] = [
+    both("servo_aileron", "", [0.1, 0.2]),
+    both("servo_elevator", "", [0.1, 0.2]),
+    both("servo_aileron_curve", "1/rad", [0.3, 0.6]),
+    both("servo_elevator_curve", "1/rad", [0.3, 0.6]),
+];
 
 impl MissingKind {
     /// The effect `id`, with amplitudes for an aircraft of the size of the X8.
@@ -89,8 +93,8 @@ impl MissingKind {
             "inertia_xz" => largest,
             // −29 N would cancel the whole thrust
             "thrust_scale" | "mass_error" => 2.0 * largest,
-            // beyond 0.5 it is out of the bounds of its effect
-            "servo_aileron" | "servo_elevator" => 2.0 * largest,
+            // three times as much is out of the bounds of the effect
+            id if SERVOS.iter().any(|servo| servo.id == id) => 2.0 * largest,
             _ => 3.0 * largest,
         }
     }

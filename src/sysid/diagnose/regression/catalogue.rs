@@ -9,7 +9,7 @@ use crate::diagnose::regression::columns::{Ready, combine};
 use crate::diagnose::regression::gather::Column;
 use crate::diagnose::regression::local::CHANNELS;
 use crate::diagnose::regression::rank::{Point, Trial};
-use greylag_model::GreyBox;
+use greylag_model::{GreyBox, JoinError};
 use greylag_physics::catalogue::on_air;
 use greylag_physics::effects::{Description, Kind};
 use greylag_physics::formula::register;
@@ -137,24 +137,44 @@ pub fn straight(entry: &Entry) -> bool {
     starts(entry).is_empty()
 }
 
-/// Adds all of `entries` to a copy of `model`, except those that cannot be added, for example because the model would have too
-/// many input effects. Returns this model, and the added entries with the values of their coefficients: zero, or the bound
-/// nearest to zero.
-pub fn with_all(model: &GreyBox, entries: &[Entry]) -> (GreyBox, Vec<(Entry, Vec<f64>)>) {
+/// A model with entries that were added to it, and the values of their coefficients: zero, or the bound nearest to zero.
+pub type With = (GreyBox, Vec<(Entry, Vec<f64>)>);
+
+/// Adds all of `entries` to copies of `model`, except those that cannot be added. A single copy has all of them, unless that
+/// would be too many input effects; those beyond the limit are added to further copies. There is at least one copy.
+pub fn with_all(model: &GreyBox, entries: &[Entry]) -> Vec<With> {
+    let (first, mut left) = with_some(model, entries);
+    let mut all = vec![first];
+    while !left.is_empty() {
+        let (next, still_left) = with_some(model, &left);
+        if next.1.is_empty() {
+            // the model has no room for any
+            break;
+        }
+        all.push(next);
+        left = still_left;
+    }
+    all
+}
+
+/// Adds `entries` to a copy of `model`. The second result has the entries for which it has too many input effects.
+fn with_some(model: &GreyBox, entries: &[Entry]) -> (With, Vec<Entry>) {
     let mut everything = model.clone();
-    let mut joined = Vec::new();
+    let (mut joined, mut left) = (Vec::new(), Vec::new());
     for e in entries {
         let nearest = |(low, high): (f64, f64)| 0.0_f64.clamp(low, high);
         let values: Vec<f64> = e.about.coefficients.iter().map(|c| nearest(c.bounds)).collect();
-        if everything.join(e.about.id, &values).is_ok() {
-            joined.push((*e, values));
+        match everything.join(e.about.id, &values) {
+            Ok(()) => joined.push((*e, values)),
+            Err(JoinError::Inputs { .. }) => left.push(*e),
+            Err(_) => (),
         }
     }
     // added effects may have set coefficients that they replace to zero; these get their values back
     for c in model.coefficients() {
         everything.set_coefficient(&c.name, c.value);
     }
-    (everything, joined)
+    ((everything, joined), left)
 }
 
 /// Indices of the coefficients that the search estimates. Linear coefficients that are 1 in every list of starting values of the
@@ -169,12 +189,16 @@ pub fn free(entry: &Entry) -> Vec<usize> {
 }
 
 impl Columns {
-    /// Adds the linear candidates `entries`. A single model with all of them gives their columns in one pass over the flights.
+    /// Adds the linear candidates `entries`. Each model of [`with_all`] gives the columns of its candidates in one pass over the
+    /// flights.
     fn add_linear(&mut self, model: &GreyBox, flights: &[Ready], entries: &[Entry]) {
-        let (everything, joined) = with_all(model, entries);
-        let wanted = model.coefficients().len()..everything.coefficients().len();
-        for (list, flight) in self.columns.iter_mut().zip(flights) {
-            list.extend(flight.linear(&everything, wanted.clone()));
+        let mut joined = Vec::new();
+        for (everything, its_own) in with_all(model, entries) {
+            let wanted = model.coefficients().len()..everything.coefficients().len();
+            for (list, flight) in self.columns.iter_mut().zip(flights) {
+                list.extend(flight.linear(&everything, wanted.clone()));
+            }
+            joined.extend(its_own);
         }
         let mut next = 0;
         for (e, values) in joined {
@@ -297,4 +321,36 @@ fn curved_columns(
         list
     };
     Some(flights.iter().map(one).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    /// There are more linear input effects than a model has room for.
+    #[test]
+    fn every_linear_input_effect_is_in_one_of_the_models() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
+        let model = GreyBox::load(&path).unwrap();
+        let mut crowded = model.clone();
+        crowded.join("actuator_lag", &[0.02]).unwrap();
+        crowded.join("dead_zone", &[0.01]).unwrap();
+        let mut full = crowded.clone();
+        full.join("backlash", &[0.01]).unwrap();
+        for (model, room) in [(&model, 3), (&crowded, 1), (&full, 0)] {
+            let all: Vec<Entry> =
+                candidates(model, &[], &[]).into_iter().filter(straight).collect();
+            let wanted: Vec<&str> = all.iter().filter(|e| e.operator).map(|e| e.about.id).collect();
+            assert_eq!(wanted.len(), 4, "{wanted:?}");
+            let mut joined: Vec<&str> = Vec::new();
+            for (_, own) in with_all(model, &all) {
+                let on_inputs = own.iter().filter(|(e, _)| e.operator);
+                let ids: Vec<&str> = on_inputs.map(|(e, _)| e.about.id).collect();
+                assert!(ids.len() <= room, "{ids:?}");
+                joined.extend(ids);
+            }
+            assert_eq!(joined, if room > 0 { wanted } else { Vec::new() });
+        }
+    }
 }

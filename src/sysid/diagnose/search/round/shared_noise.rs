@@ -57,13 +57,18 @@ pub(super) fn shared(
 ) -> (Vec<Vec<f64>>, Vec<Placed>) {
     let straight: Vec<Entry> =
         of.entries.iter().filter(|e| catalogue::straight(e)).copied().collect();
-    let everything = catalogue::with_all(of.model, &straight).0;
+    let models = catalogue::with_all(of.model, &straight);
+    let count = of.model.coefficients().len();
     let drawn = |draw: usize| {
         let flights = disturbed(of, draw);
         // the columns of the model's and the candidates' coefficients are computed together
         let all = |flight: &Ready| {
-            let mut own = flight.linear(&everything, 0..everything.coefficients().len());
-            let candidates = own.split_off(of.model.coefficients().len());
+            let mut own = Vec::new();
+            for (place, (with, _)) in models.iter().enumerate() {
+                let first = if place == 0 { 0 } else { count };
+                own.extend(flight.linear(with, first..with.coefficients().len()));
+            }
+            let candidates = own.split_off(count);
             (own, candidates)
         };
         let (columns, candidates) = flights.par_iter().map(all).unzip();
