@@ -102,6 +102,7 @@ impl Rows {
             }
         }
         rows.truncate(kept);
+        rows.shrink_to_fit();
         Rows { samples: rows, ..self }
     }
 

@@ -1,5 +1,6 @@
 //! Two ways to evaluate the equations of motion, which are long functions. One is a call of a copy that is compiled once per
-//! scalar type. In the other, the equations are inlined into the caller.
+//! scalar type. In the other, the equations are inlined into the caller. A third one, with derivatives with respect to the
+//! coefficients, is in the module `slopes`.
 //!
 //! A kernel that is compiled for several instruction sets must inline the equations, because a called copy would not use the
 //! kernel's instruction set. In other functions, inlining would only increase the size of the program and the compile time.
@@ -10,9 +11,9 @@ use greylag_physics::rigid_body::Vector;
 use greylag_physics::{AirData, Controls, State};
 
 /// One way to evaluate the forces and the residual of a model.
-pub(super) trait Forces: Copy {
+pub(super) trait Forces<R: Real>: Copy {
     /// Linear acceleration (m/s²) and angular acceleration (rad/s²) in body axes.
-    fn accelerations<R: Real>(
+    fn accelerations(
         self,
         model: &GreyBox,
         state: &State<R>,
@@ -20,12 +21,7 @@ pub(super) trait Forces: Copy {
         air: &AirData<R>,
     ) -> (Vector<R>, Vector<R>);
     /// Contribution of the learned residual to the time derivative of the state, in units of `State` per second.
-    fn learned<R: Real>(
-        self,
-        residual: &Residual,
-        state: &State<R>,
-        controls: &Controls<R>,
-    ) -> State<R>;
+    fn learned(self, residual: &Residual, state: &State<R>, controls: &Controls<R>) -> State<R>;
 }
 
 /// Calls the copy compiled for the scalar type.
@@ -36,8 +32,8 @@ pub(super) struct Called;
 #[derive(Clone, Copy)]
 pub(super) struct Inlined;
 
-impl Forces for Called {
-    fn accelerations<R: Real>(
+impl<R: Real> Forces<R> for Called {
+    fn accelerations(
         self,
         model: &GreyBox,
         state: &State<R>,
@@ -47,19 +43,14 @@ impl Forces for Called {
         model.accelerations(state, controls, air)
     }
     #[inline(never)]
-    fn learned<R: Real>(
-        self,
-        residual: &Residual,
-        state: &State<R>,
-        controls: &Controls<R>,
-    ) -> State<R> {
+    fn learned(self, residual: &Residual, state: &State<R>, controls: &Controls<R>) -> State<R> {
         residual.rate(state, controls)
     }
 }
 
-impl Forces for Inlined {
+impl<R: Real> Forces<R> for Inlined {
     #[inline(always)]
-    fn accelerations<R: Real>(
+    fn accelerations(
         self,
         model: &GreyBox,
         state: &State<R>,
@@ -69,12 +60,7 @@ impl Forces for Inlined {
         model.accelerations_inlined(state, controls, air)
     }
     #[inline(always)]
-    fn learned<R: Real>(
-        self,
-        residual: &Residual,
-        state: &State<R>,
-        controls: &Controls<R>,
-    ) -> State<R> {
+    fn learned(self, residual: &Residual, state: &State<R>, controls: &Controls<R>) -> State<R> {
         residual.rate(state, controls)
     }
 }

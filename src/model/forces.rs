@@ -21,10 +21,10 @@ const RATE_PASSES: usize = 4;
 
 /// The point of evaluation: state, controls and airflow.
 #[derive(Clone, Copy)]
-struct Place<'a, R> {
-    state: &'a State<R>,
-    controls: &'a Controls<R>,
-    air: &'a AirData<R>,
+pub(super) struct Place<'a, R> {
+    pub(super) state: &'a State<R>,
+    pub(super) controls: &'a Controls<R>,
+    pub(super) air: &'a AirData<R>,
 }
 
 /// Coefficients by which the terms are multiplied.
@@ -41,11 +41,11 @@ impl<R: Real> Weights<R> for &[Named] {
 }
 
 /// Sum of terms multiplied by their coefficients.
-struct Sum<W, R> {
-    weights: W,
+pub(super) struct Sum<W, R> {
+    pub(super) weights: W,
     /// Index of the first coefficient of the effect that is being evaluated.
-    first: usize,
-    wrench: Wrench<R>,
+    pub(super) first: usize,
+    pub(super) wrench: Wrench<R>,
 }
 
 /// Receiver that calls `term` with each term and the index of its coefficient in the model's list.
@@ -154,7 +154,11 @@ impl GreyBox {
 
     /// Passes the terms of the effects that need only the point to `terms`.
     #[inline(always)]
-    fn independent_terms<R: Real>(&self, place: &Place<R>, terms: &mut impl Starting<R>) {
+    pub(super) fn independent_terms<R: Real>(
+        &self,
+        place: &Place<R>,
+        terms: &mut impl Starting<R>,
+    ) {
         let base = Base::zero();
         let at = self.point(place, &base);
         for Term { kind, first, points, shape, .. } in &self.terms[..self.independent] {
@@ -189,14 +193,10 @@ impl GreyBox {
     /// Sum of the effects that need only the point.
     #[inline(always)]
     fn independent_sum<R: Real>(&self, place: &Place<R>) -> Wrench<R> {
-        let mut sum = self.sum_from(Wrench::zero());
+        let weights = self.coefficients.as_slice();
+        let mut sum = Sum { weights, first: 0, wrench: Wrench::zero() };
         self.independent_terms(place, &mut sum);
         sum.wrench
-    }
-
-    #[inline(always)]
-    fn sum_from<R>(&self, wrench: Wrench<R>) -> Sum<&[Named], R> {
-        Sum { weights: &self.coefficients, first: 0, wrench }
     }
 
     /// Input of the effects that need more than the point, and the sum of all effects. `independent` is the sum of the
@@ -214,7 +214,7 @@ impl GreyBox {
     /// [`with_dependent`](GreyBox::with_dependent) with given [`parts`](GreyBox::parts), which are `None` if no effect needs
     /// them. `weights` are the coefficients of the effects that need more than the point.
     #[inline(always)]
-    fn completed<R: Real>(
+    pub(super) fn completed<R: Real>(
         &self,
         place: &Place<R>,
         independent: Wrench<R>,
@@ -351,7 +351,7 @@ impl GreyBox {
     }
 
     #[inline(always)]
-    fn accelerations_under<R: Real>(
+    pub(super) fn accelerations_under<R: Real>(
         &self,
         wrench: &Wrench<R>,
         state: &State<R>,
@@ -387,7 +387,7 @@ impl GreyBox {
         state: &State<R>,
         controls: &Controls<R>,
         altitude: f64,
-        forces: impl Forces,
+        forces: impl Forces<R>,
     ) -> State<R> {
         let air = self.air(state, altitude);
         let (acceleration, spin) = forces.accelerations(self, state, controls, &air);

@@ -87,14 +87,15 @@ impl GreyBox {
         self.step_from(state, controls, altitude, memory, Inlined)
     }
 
+    /// The same as `step`, with `forces` that are called or inlined.
     #[inline(always)]
-    fn step_from<R: Real>(
+    pub(crate) fn step_from<R: Real>(
         &self,
         state: &State<R>,
         controls: &Controls<R>,
         altitude: f64,
         memory: &mut Memory<R>,
-        forces: impl Forces,
+        forces: impl Forces<R>,
     ) -> State<R> {
         match self.integrator {
             Integrator::Rk4 => self.step_rk4(state, controls, altitude, forces),
@@ -108,7 +109,7 @@ impl GreyBox {
         s: &State<R>,
         controls: &Controls<R>,
         altitude: f64,
-        forces: impl Forces,
+        forces: impl Forces<R>,
     ) -> State<R> {
         let (mut at, mut next) = (*s, *s);
         // for each stage: step from `s` to the next stage, and weight of the slope in the sum, both in s
@@ -133,7 +134,7 @@ impl GreyBox {
         controls: &Controls<R>,
         altitude: f64,
         memory: &mut Memory<R>,
-        forces: impl Forces,
+        forces: impl Forces<R>,
     ) -> State<R> {
         let air = self.air(s, altitude);
         let (mut acceleration, mut spin) = forces.accelerations(self, s, controls, &air);

@@ -21,6 +21,8 @@ pub mod plausible;
 pub mod population;
 mod newton;
 pub mod residual;
+#[cfg(feature = "slopes")]
+mod slopes;
 pub mod textbook;
 mod trim;
 pub mod weights;
@@ -35,4 +37,6 @@ pub use join::JoinError;
 pub use known::{FlightConstants, Known};
 pub use linear::{Linear, linearise, linearise_step};
 pub use residual::Residual;
+#[cfg(feature = "slopes")]
+pub use slopes::{SLOPES, Sloped};
 pub use trim::{Trim, TrimError};

@@ -77,6 +77,8 @@ impl Raw {
             judge(&mut rows, i + 2, None, &all[..kept]);
         }
         all.truncate(kept);
+        // a table that has grown row by row may have room for twice as many
+        all.shrink_to_fit();
         rows.samples = all;
         rows
     }

@@ -17,7 +17,7 @@ use crate::compare::forecast;
 use crate::flight_path::reconstruction::Reconstruction;
 use crate::per_flight::known::put_right;
 use crate::per_flight::{PerFlight, SensorErrors};
-use crate::progress::{Progress, ignore_progress, report};
+use crate::progress::{Progress, report};
 use crate::weak_form::prepared::Prepared;
 use greylag_model::GreyBox;
 
@@ -75,6 +75,9 @@ pub struct Scored {
 /// Leaves out each of `flights` in turn and computes the error of each of `structures` of `model` on this flight. Baselines
 /// (forecasts without aerodynamics) follow in the result and are never chosen.
 ///
+/// All flights are fitted once for each structure. The fits without a flight start from there and are nearly those from the
+/// beginning, see `output_error::without_each`.
+///
 /// The chosen structure has the fewest free coefficients among all whose mean error exceeds that of the best structure by no
 /// more than one standard error of the difference, flight by flight, or by 1 % (the rule of Breiman et al., Classification and
 /// Regression Trees, 1984, section 3.4.3, with paired differences).
@@ -109,20 +112,21 @@ pub fn leave_one_out(
     let names: Vec<String> = judges.iter().map(|k| flights[*k].name.clone()).collect();
     let set = Set { judged: &ready, fitted: &right, judges: &judges, at };
     let (mut all, mut failed, mut any_fit) = (Vec::new(), None, false);
+    let mut tuned: Option<Models> = None;
     for (k, structure) in structures.iter().enumerate() {
         let doing = format!("{}: leaving out one flight after the other", structure.name);
         report(progress, &doing, k as f64 / structures.len() as f64)?;
-        let one = |left: &usize| error_of(model, &set, *left, &structure.fitted);
-        let outcomes: Vec<Result<f64, AmendError>> =
-            judges.par_iter().map(one).collect::<Result<_, AmendError>>()?;
-        any_fit |=
-            !matches!(structure.fitted, Fitted::Nothing) && outcomes.iter().any(Result::is_ok);
-        let mut errors = Vec::with_capacity(outcomes.len());
-        for outcome in outcomes {
-            errors.push(*outcome.as_ref().unwrap_or(&f64::NAN));
-            failed = failed.or(outcome.err());
+        let fitted = &structure.fitted;
+        let models = match (fitted, &tuned) {
+            (Fitted::Nothing, _) => vec![Some(model.clone()); judges.len()],
+            (Fitted::LinearResidual, Some(tuned)) => tuned.clone(),
+            _ => fit(model, &set, fitted, &mut failed)?,
+        };
+        any_fit |= !matches!(fitted, Fitted::Nothing) && models.iter().any(Option::is_some);
+        all.push(scored(structure, free(model, fitted)?, set.errors(&models, fitted)));
+        if fitted.tunes_only() {
+            tuned = Some(models);
         }
-        all.push(scored(structure, free(model, &structure.fitted)?, errors));
     }
     // if no fit succeeded, the model as given would be chosen without a comparison
     if let Some(why) = failed.filter(|_| !any_fit) {
@@ -133,6 +137,22 @@ pub fn leave_one_out(
     all.iter_mut().for_each(|s| s.flights = names.clone());
     Ok(all)
 }
+
+impl Fitted {
+    /// Whether only the model's coefficients are fitted, or a linear residual after them.
+    fn tunes_only(&self) -> bool {
+        match self {
+            Fitted::LinearResidual => true,
+            Fitted::Coefficients { effects, per_flight } => {
+                effects.is_empty() && unjudged(per_flight) == unjudged(&PerFlight::default())
+            }
+            Fitted::Nothing | Fitted::FromScratch => false,
+        }
+    }
+}
+
+/// For each flight that is left out, the model that was fitted to all other flights; `None` if the fit failed.
+type Models = Vec<Option<GreyBox>>;
 
 /// The flights of a cross-validation.
 struct Set<'a> {
@@ -174,23 +194,35 @@ fn scores(
     Judge { test, horizons_s }.scores(model)
 }
 
-/// Error of the flight with the index `left`, predicted by a fit to all other flights. The inner error states why this fit
-/// failed.
-fn error_of(
+impl Set<'_> {
+    /// Error of each predicted flight with the model that was fitted to all other flights; NaN without a model. If `fitted` asks
+    /// for it, the model gets a linear residual.
+    fn errors(&self, models: &[Option<GreyBox>], fitted: &Fitted) -> Vec<f64> {
+        let one = |(left, model): (&usize, &Option<GreyBox>)| {
+            let Some(model) = model else { return f64::NAN };
+            let test = std::slice::from_ref(&self.judged[*left]);
+            let error =
+                |model: &GreyBox| judged(&scores(model, test, &[self.at])).unwrap_or(f64::NAN);
+            match fitted {
+                Fitted::LinearResidual => error(&corrected(model.clone(), self, *left)),
+                _ => error(model),
+            }
+        };
+        self.judges.par_iter().zip(models).map(one).collect()
+    }
+}
+
+/// Fits the structure `fitted` without each of the predicted flights. The first error of a fit is put in `failed`.
+fn fit(
     model: &GreyBox,
     set: &Set,
-    left: usize,
     fitted: &Fitted,
-) -> Result<Result<f64, AmendError>, AmendError> {
+    failed: &mut Option<AmendError>,
+) -> Result<Models, AmendError> {
     let anew = matches!(fitted, Fitted::Coefficients { per_flight, .. } if per_flight.angles() > 0);
     let flights = if anew { set.judged } else { set.fitted };
-    let others = flights.iter().enumerate().filter(|(k, _)| *k != left);
-    let others: Vec<Flight> = others.map(|(_, f)| f.clone()).collect();
-    let test = std::slice::from_ref(&set.judged[left]);
-    let error = |model: &GreyBox| judged(&scores(model, test, &[set.at])).unwrap_or(f64::NAN);
     let (start, options) = match fitted {
-        Fitted::Nothing => return Ok(Ok(error(model))),
-        Fitted::LinearResidual => (
+        Fitted::Nothing | Fitted::LinearResidual => (
             model.clone(),
             FitOptions { per_flight: unjudged(&PerFlight::default()), ..FitOptions::default() },
         ),
@@ -205,11 +237,18 @@ fn error_of(
             (with(model, effects)?, options)
         }
     };
-    let fit = output_error::fit(&start, &others, &options, &ignore_progress);
-    Ok(fit.map(|fit| match fitted {
-        Fitted::LinearResidual => error(&corrected(fit.model, set, left)),
-        _ => error(&fit.model),
-    }))
+    let fits = output_error::without_each(&start, flights, &options, set.judges);
+    let mut models = Vec::with_capacity(fits.len());
+    for fit in fits {
+        match fit {
+            Ok(fit) => models.push(Some(fit.model)),
+            Err(why) => {
+                *failed = failed.take().or(Some(why));
+                models.push(None);
+            }
+        }
+    }
+    Ok(models)
 }
 
 /// `per_flight` without common sensor errors, unless they are kept in any case: no other flight is left to judge them.
@@ -296,6 +335,7 @@ fn choose(all: &mut [Scored]) {
 mod tests {
     use super::*;
     use crate::flight_path::reconstruction::{Instant, Segment};
+    use crate::progress::ignore_progress;
     use greylag_physics::{Controls, State};
 
     /// A flight of 3 s without motion.

@@ -7,6 +7,7 @@
 mod amendment;
 mod answer;
 mod conventions;
+mod derivatives;
 pub mod document;
 mod equation_error;
 mod error;

@@ -6,25 +6,31 @@
 //! the search. Priors are Gaussian, with the standard deviation [`Named::width`](greylag_model::Named::width).
 
 mod estimates;
+mod folds;
 mod gauss_newton;
+mod shots;
+mod start;
 mod weights;
 
-use nalgebra::DMatrix;
+use std::ops::Range;
+use std::sync::Arc;
+
+use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::equation_error;
+use super::derivatives::{Derivatives, Neighbourhood, derivatives};
 use super::error::AmendError;
 use super::flight::{Flight, Own, SENSORS, SKEW, SKEW_LEAST};
-use super::learned;
-use super::normal::{self, Neighbourhood, Place, Weights};
+use super::normal::{self, Place, Weights};
 use super::parameters::{self, Free};
 use super::result::{FittedFlight, Parameter};
-use super::shooting::{self, Shot};
-use crate::diagnose::search::clocks::{self, Clocks};
-use crate::per_flight::{PerFlight, trims};
+use super::shooting::Shot;
+use crate::per_flight::PerFlight;
 use crate::progress::{Cancelled, Progress, report};
 use greylag_model::GreyBox;
-use greylag_num::statistics::quantile;
+use start::Start;
+
+pub(super) use folds::without_each;
 
 /// Smallest usable duration of all flights together, s.
 pub const LEAST_S: f64 = 10.0;
@@ -35,8 +41,14 @@ const STEP_TOLERANCE: f64 = 0.03;
 const RENEWED: f64 = 0.1;
 /// Replaces `RENEWED` for all shot lengths except the last.
 const NEAR: f64 = 5.0;
+/// Derivatives count as accurate up to this change of any coefficient, in standard deviations. The simulated states then change
+/// by no more than their noise, and the derivatives by a few percent. An estimate with such derivatives differs by less than
+/// `RENEWED` from one with new derivatives.
+const VALID: f64 = 1.0;
 /// Largest number of steps with the same derivatives.
 const INNER: usize = 6;
+/// Damping at the start of a search.
+const DAMPING: f64 = 1e-6;
 /// Standard deviations of the residuals assumed at the start, in the units of the state.
 const COARSE: [f64; 8] = [0.02, 0.02, 0.4, 0.05, 0.05, 0.05, 0.02, 0.02];
 /// Prior standard deviations of a reconstructed state's errors, in the units of the state.
@@ -114,77 +126,8 @@ pub fn fit(
     options: &FitOptions,
     progress: &Progress,
 ) -> Result<Fit, AmendError> {
-    let name = || model.name.clone();
-    let flown_s: f64 = flights.iter().map(Flight::seconds).sum();
-    if flown_s < LEAST_S {
-        return Err(AmendError::TooLittle { model: name(), flown_s, needed_s: LEAST_S });
-    }
-    let names: Vec<&str> = flights.iter().map(|f| f.prepared.name.as_str()).collect();
-    learned::distinct(&names, &options.per_flight)?;
-    let added: Vec<&str> = options.added.iter().map(String::as_str).collect();
-    let free = parameters::free(model, &added);
-    if free.is_empty() {
-        return Err(AmendError::NothingFree { model: name() });
-    }
-    let doing = format!("{}: equation error over {} flight(s)", model.name, flights.len());
-    report(progress, &doing, 0.0)?;
-    let clocks = match free.iter().any(|f| f.input && f.added) {
-        true => clocks(model, &free, flights, options.per_flight),
-        false => None,
-    };
-    let theta = match &clocks {
-        Some(clocks) => values(&clocks.model, &free),
-        None => equation_error::start(model, &free, flights),
-    };
-    let asked = options.per_flight;
-    let given = values(model, &free);
-    let flown = if asked.has_trims() { trims::joined(model)? } else { model.clone() };
-    let mut search = Search::new(&flown, flights, free, theta, asked);
-    if let Some(clocks) = clocks {
-        search.set_clocks(&clocks.late);
-    }
-    for (k, length_s) in options.lengths_s.iter().enumerate() {
-        let doing = format!("{}: output error over {length_s} s", model.name);
-        let share = 0.9 / options.lengths_s.len() as f64;
-        let from = 0.1 + share * k as f64;
-        let step = |share_done: f64| report(progress, &doing, from + share * share_done);
-        step(0.0)?;
-        if k == 0 {
-            search.start_from_the_closer(&given, *length_s);
-        }
-        search.shots_of(*length_s)?;
-        // only the last length determines the result
-        match k + 1 == options.lengths_s.len() {
-            true => search.settle(options.renewals, RENEWED, &step)?,
-            false => search.settle(options.renewals.min(2), NEAR, &step)?,
-        }
-    }
-    let held = search.hold_undetermined();
-    if !held.is_empty() {
-        let step =
-            |_: f64| report(progress, "undetermined coefficients held, the others again", 0.99);
-        search.settle(options.renewals, RENEWED, &step)?;
-    }
-    search.finish(model, &held)
-}
-
-/// Estimates the delays of the recorded actuators from forces and moments, together with the input effects of the model.
-/// Free runs cannot distinguish a delay of the record from a delay of the actuators.
-fn clocks(
-    model: &GreyBox,
-    free: &[Free],
-    flights: &[Flight],
-    per_flight: PerFlight,
-) -> Option<Clocks> {
-    let given = free.iter().filter(|f| f.added).map(|f| f.index).min()?;
-    let flights: Vec<_> = flights.iter().map(|f| (&f.prepared, &f.forces)).collect();
-    clocks::clocks(model, given, &flights, per_flight)
-}
-
-/// Values of the free coefficients in `model`, limited to their bounds.
-fn values(model: &GreyBox, free: &[Free]) -> Vec<f64> {
-    let of = |f: &Free| model.coefficients()[f.index].value.clamp(f.bounds.0, f.bounds.1);
-    free.iter().map(of).collect()
+    let start = Start::of(model, flights, options, progress)?;
+    start.searched(flights, options, progress)?.completed(model, options, progress)
 }
 
 /// State of a search.
@@ -193,14 +136,16 @@ struct Search<'a> {
     base: &'a GreyBox,
     /// Trims and misalignment angles that are estimated for each flight, in addition to its sensor errors.
     asked: PerFlight,
-    flights: &'a [Flight],
+    flights: Vec<&'a Flight>,
     free: Vec<Free>,
     shots: Vec<Shot>,
     /// Derivatives of each shot's residuals, possibly computed at an earlier point of the search.
-    jacobians: Vec<DMatrix<f64>>,
+    derivatives: Vec<Arc<Derivatives>>,
     /// Number of shots cut short because their runs diverge.
     short: usize,
     place: Place,
+    /// Residuals of each shot at `place`.
+    residuals: Vec<Vec<[f64; 8]>>,
     /// Prior mean and standard deviation of each sensor constant of each flight.
     expected: Vec<[[f64; 2]; SENSORS]>,
     weights: Weights,
@@ -213,158 +158,156 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(
-        base: &'a GreyBox,
-        flights: &'a [Flight],
-        free: Vec<Free>,
-        theta: Vec<f64>,
-        asked: PerFlight,
-    ) -> Self {
+    fn new(start: &'a Start, flights: &'a [Flight], asked: PerFlight) -> Self {
         let expected: Vec<_> = flights.iter().map(|f| f.doubt).collect();
         let own = flights.iter().map(|f| Own::of(f.doubt.map(|[mean, _]| mean))).collect();
         let inverse = |sd: [f64; 8]| sd.map(|x| x.powi(-2));
         // residuals of an inaccurate model are correlated over about a fifth of a second
         let weights = Weights { output: inverse(COARSE).map(|w| w / 20.0), start: inverse(START) };
-        Search {
-            base,
+        let mut search = Search {
+            base: &start.flown,
             asked,
-            flights,
-            free,
+            flights: flights.iter().collect(),
+            free: start.free.clone(),
             shots: Vec::new(),
-            jacobians: Vec::new(),
+            derivatives: Vec::new(),
             short: 0,
-            place: Place { theta, own, starts: Vec::new() },
+            place: Place { theta: start.theta.clone(), own, starts: Vec::new() },
+            residuals: Vec::new(),
             expected,
             weights,
             iterations: 0,
             change: (f64::INFINITY, 0),
             stuck: false,
+        };
+        if let Some(clocks) = &start.clocks {
+            search.expect_delays(&clocks.late);
+            for (own, [late, _]) in search.place.own.iter_mut().zip(&clocks.late) {
+                own.sensors[SKEW] = *late;
+            }
         }
+        search
     }
 
     /// Sets the prior means (s) and standard deviations of the actuators' delays.
-    fn set_clocks(&mut self, clocks: &[[f64; 2]]) {
-        let flights = self.expected.iter_mut().zip(&mut self.place.own);
-        for ((expected, own), [late, sd]) in flights.zip(clocks) {
+    fn expect_delays(&mut self, late: &[[f64; 2]]) {
+        for (expected, [late, sd]) in self.expected.iter_mut().zip(late) {
             expected[SKEW] = [*late, sd.max(SKEW_LEAST)];
-            own.sensors[SKEW] = *late;
         }
-    }
-
-    /// Cuts the flights into shots of `length_s` (s), and shortens the shots in which the present model diverges.
-    fn shots_of(&mut self, length_s: f64) -> Result<(), AmendError> {
-        self.shots = shooting::cut(self.flights, length_s);
-        self.place.starts = vec![[0.0; 8]; self.shots.len()];
-        let model = parameters::with(self.base, &self.free, &self.place.theta);
-        let acting = normal::acting(&model, self.flights, &self.place);
-        let reach: Vec<usize> = self
-            .shots
-            .par_iter()
-            .map(|shot| {
-                let flight = &self.flights[shot.flight].prepared;
-                let own = &self.place.own[shot.flight];
-                let start = shooting::start(shot, flight, own, &[0.0; 8]);
-                let controls = &acting[shot.flight][shot.segment];
-                let model = normal::of_flight(&model, own);
-                shooting::fly(&model, flight, shot, controls, start).len()
-            })
-            .collect();
-        self.short = 0;
-        for (shot, reach) in self.shots.iter_mut().zip(&reach) {
-            if *reach < shot.steps {
-                // only the first three quarters of the run before divergence are used
-                shot.steps = reach * 3 / 4;
-                self.short += 1;
-            }
-        }
-        let worth = |shot: &Shot| {
-            shot.steps as f64 * self.flights[shot.flight].prepared.dt >= shooting::SHORTEST_S
-        };
-        let left = self.shots.iter().filter(|s| worth(s)).count();
-        if 2 * left < self.shots.len() {
-            let reach: Vec<f64> = self
-                .shots
-                .iter()
-                .zip(reach)
-                .map(|(s, r)| r as f64 * self.flights[s.flight].prepared.dt)
-                .collect();
-            let reach_s = quantile(&reach, 0.5);
-            return Err(AmendError::Diverges { model: self.base.name.clone(), reach_s });
-        }
-        self.shots.retain(worth);
-        self.place.starts.truncate(self.shots.len());
-        Ok(())
     }
 
     /// Iterates estimates and weights to convergence.
     ///
     /// The derivatives are the most expensive part. They are recomputed only after the search has converged with the old
-    /// derivatives. The search ends if a step with new derivatives changes no coefficient by more than `tolerance` standard
-    /// deviations. `step` receives the fraction of `renewals` that is done.
+    /// derivatives. The search ends if this has changed no coefficient by more than [`VALID`] standard deviations, or if a step
+    /// with new derivatives changes no coefficient by more than `tolerance` standard deviations.
+    ///
+    /// `renewals` are the numbers of the computations of the derivatives; number 0 is the first one of a search with these shots.
+    /// `step` receives the fraction of them that is done.
     fn settle(
         &mut self,
-        renewals: usize,
+        renewals: Range<usize>,
         tolerance: f64,
         step: &dyn Fn(f64) -> Result<(), Cancelled>,
     ) -> Result<(), AmendError> {
-        let mut damping = 1e-6;
-        for renewal in 0..renewals {
-            let done = renewal as f64 / renewals as f64;
+        let (mut damping, end) = (DAMPING, renewals.end);
+        for renewal in renewals {
+            let done = renewal as f64 / end as f64;
             step(done)?;
             self.differentiate();
-            let mut first = f64::INFINITY;
-            for inner in 0..INNER {
-                step(done)?;
-                let system = self.system();
-                let moved = self.step(&system, &mut damping)?;
-                self.stuck = !moved;
-                self.iterations += 1;
-                if inner == 0 {
-                    first = self.change.0;
-                }
-                if self.change.0 < 3.0 || renewal + inner < 2 {
-                    self.reweigh();
-                }
-                if !moved || self.change.0 < STEP_TOLERANCE {
-                    break;
-                }
-            }
-            if renewal > 0 && first < tolerance {
+            let from = self.place.theta.clone();
+            let first = self.approach(renewal, &mut damping, &|| step(done))?;
+            if (renewal > 0 && first < tolerance) || self.derivatives_hold(&from) {
                 break;
             }
         }
         Ok(())
     }
 
-    fn differentiate(&mut self) {
-        let around =
-            Neighbourhood::new(self.base, &self.free, self.flights, &self.place, self.asked);
-        let one = |(index, shot): (usize, &Shot)| {
-            normal::jacobian(&around, self.flights, shot, index, &self.place)
-        };
-        self.jacobians = self.shots.par_iter().enumerate().map(one).collect();
+    /// Takes steps with the same derivatives, the number `renewal` of a search, until they are small. Returns the largest change
+    /// of a coefficient in the first step, in its standard deviations. `go_on` may cancel.
+    fn approach(
+        &mut self,
+        renewal: usize,
+        damping: &mut f64,
+        go_on: &dyn Fn() -> Result<(), Cancelled>,
+    ) -> Result<f64, AmendError> {
+        let mut first = f64::INFINITY;
+        for inner in 0..INNER {
+            go_on()?;
+            let system = self.system();
+            let moved = self.step(&system, damping)?;
+            self.stuck = !moved;
+            self.iterations += 1;
+            if inner == 0 {
+                first = self.change.0;
+            }
+            if self.change.0 < 3.0 || renewal + inner < 2 {
+                self.reweigh();
+            }
+            if !moved || self.change.0 < STEP_TOLERANCE {
+                break;
+            }
+        }
+        Ok(first)
     }
 
-    fn residuals(&self) -> Vec<Vec<[f64; 8]>> {
-        self.residuals_at(&self.place)
+    /// Whether the derivatives, which were computed at the coefficients `from`, are still accurate enough at the present ones, to
+    /// which the steps have converged.
+    fn derivatives_hold(&self, from: &[f64]) -> bool {
+        if self.stuck || self.change.0.is_nan() || self.change.0 >= STEP_TOLERANCE {
+            return false;
+        }
+        let changes = self.place.theta.iter().zip(from).map(|(x, from)| x - from);
+        let changes = DVector::from_iterator(from.len(), changes);
+        self.in_deviations(&self.system(), &changes).0 <= VALID
+    }
+
+    /// Computes the derivatives at the present estimates.
+    fn differentiate(&mut self) {
+        // the old ones are dropped first, because they take most of the memory
+        self.derivatives = Vec::new();
+        let (flights, place) = (&self.flights, &self.place);
+        let around = Neighbourhood::new(self.base, &self.free, flights, place, self.asked);
+        let one = |(shot, here): ((usize, &Shot), &Vec<[f64; 8]>)| {
+            Arc::new(derivatives(&around, flights, shot, place, here))
+        };
+        let pairs = self.shots.par_iter().enumerate().zip(&self.residuals);
+        self.derivatives = pairs.map(one).collect();
     }
 
     fn residuals_at(&self, place: &Place) -> Vec<Vec<[f64; 8]>> {
         let model = parameters::with(self.base, &self.free, &place.theta);
-        let acting = normal::acting(&model, self.flights, place);
+        let acting = normal::acting(&model, &self.flights, place);
         let one = |(shot, from): (&Shot, &[f64; 8])| {
-            normal::run(&model, &acting, self.flights, shot, &place.own[shot.flight], from)
+            normal::run(&model, &acting, &self.flights, shot, &place.own[shot.flight], from)
         };
         self.shots.par_iter().zip(&place.starts).map(one).collect()
     }
 
-    /// Half the weighted sum of squares of residuals, initial-state errors and deviations from the prior means.
-    fn cost(&self, place: &Place) -> f64 {
-        let residuals = self.residuals_at(place);
-        let data: f64 = (self.shots.iter().zip(&residuals).zip(&place.starts))
+    /// Half the weighted sum of squares of residuals, initial-state errors and deviations from the prior means. `residuals` are
+    /// those at `place`.
+    fn cost(&self, place: &Place, residuals: &[Vec<[f64; 8]>]) -> f64 {
+        let data: f64 = (self.shots.iter().zip(residuals).zip(&place.starts))
             .map(|((shot, r), from)| normal::cost(shot, r, from, &self.weights))
             .sum();
         let (unknowns, prior) = (self.unknowns(place), self.prior());
         data + 0.5 * unknowns.component_mul(&unknowns).dot(&prior)
+    }
+
+    /// Holds the undetermined coefficients, and returns the result. `given` is the model before the fit.
+    fn completed(
+        mut self,
+        given: &GreyBox,
+        options: &FitOptions,
+        progress: &Progress,
+    ) -> Result<Fit, AmendError> {
+        let held = self.hold_undetermined();
+        if !held.is_empty() {
+            let step =
+                |_: f64| report(progress, "undetermined coefficients held, the others again", 0.99);
+            self.settle(0..options.renewals, RENEWED, &step)?;
+        }
+        self.finish(given, &held)
     }
 }

@@ -7,7 +7,8 @@ use crate::flight_path::reconstruction::Instant;
 use crate::per_flight::askew;
 use crate::weak_form::prepared::Prepared;
 use greylag_logs::Sampling;
-use greylag_model::{GreyBox, Memory};
+use greylag_model::{GreyBox, Memory, Sloped};
+use greylag_num::Real;
 use greylag_physics::{Controls, State};
 
 /// A run has diverged once its scaled error exceeds this bound. The scaled error is the root mean square, over the states, of the
@@ -30,9 +31,9 @@ pub(super) struct Shot {
 }
 
 /// Cuts the flights into shots of about `length_s` (s).
-pub(super) fn cut(flights: &[Flight], length_s: f64) -> Vec<Shot> {
+pub(super) fn cut(flights: &[&Flight], length_s: f64) -> Vec<Shot> {
     let mut shots = Vec::new();
-    for (flight, Flight { prepared, .. }) in flights.iter().enumerate() {
+    for (flight, prepared) in flights.iter().map(|f| &f.prepared).enumerate() {
         for (segment, instants) in prepared.segments.iter().enumerate() {
             let steps = instants.len() - 1;
             let pieces = ((steps as f64 * prepared.dt / length_s).round() as usize).max(1);
@@ -161,15 +162,61 @@ pub(super) fn fly(
     for k in shot.start..shot.start + shot.steps {
         state = advance(k, state, &mut memory);
         let now = state.to_array();
-        let error = error(&segment[k + 1].state.to_array(), &now);
-        let mean = error.iter().zip(&scale).map(|(e, x)| (e / x).powi(2)).sum::<f64>() / 8.0;
-        // NaN also ends the run
-        if mean.is_nan() || mean > LEFT * LEFT {
+        if diverged(&segment[k + 1], &now, &scale) {
             break;
         }
         path.push(now);
     }
     path
+}
+
+/// Whether the error of the predicted state `now` at the sample `measured` exceeds the bound of a run. NaN also ends a run.
+fn diverged(measured: &Instant, now: &[f64; 8], scale: &[f64; 8]) -> bool {
+    let error = error(&measured.state.to_array(), now);
+    let mean = error.iter().zip(scale).map(|(e, x)| (e / x).powi(2)).sum::<f64>() / 8.0;
+    mean.is_nan() || mean > LEFT * LEFT
+}
+
+/// Makes the run of [`fly`] with derivatives. `variables` are the coefficients that are variables, as for
+/// [`GreyBox::step_sloped`]. `controls` returns the deflections of a model step of the segment.
+///
+/// `seen` receives the number of each compared sample, from 0, and the state there. After divergence it receives the last state
+/// again, because the residuals keep their last value. If the run diverges in its first step, `seen` is not called.
+pub(super) fn fly_sloped(
+    (model, variables): (&GreyBox, &[Option<usize>]),
+    flight: &Prepared,
+    shot: &Shot,
+    controls: impl Fn(usize) -> Controls<Sloped>,
+    start: [Sloped; 8],
+    mut seen: impl FnMut(usize, &[Sloped; 8]),
+) {
+    let segment = &flight.segments[shot.segment];
+    let scale = model.scale();
+    let mut memory = Memory::default();
+    let model = flight.stepping(model);
+    let advance = |k: usize, state: State<Sloped>, memory: &mut Memory<Sloped>| {
+        let altitude = segment[k].altitude;
+        let steps = k * flight.substeps..(k + 1) * flight.substeps;
+        steps.fold(state, |s, step| {
+            model.step_sloped(variables, &s, &controls(step), altitude, memory)
+        })
+    };
+    if let Some(before) = shot.start.checked_sub(1) {
+        advance(before, segment[before].state.map(Sloped::from_f64), &mut memory);
+    }
+    let (mut state, mut reached) = (State::from_array(start), 0);
+    for k in 0..shot.steps {
+        let next = advance(shot.start + k, state, &mut memory);
+        let now = next.to_array();
+        if diverged(&segment[shot.start + k + 1], &now.map(|x| x.value), &scale) {
+            break;
+        }
+        seen(k, &now);
+        (state, reached) = (next, k + 1);
+    }
+    if reached > 0 {
+        (reached..shot.steps).for_each(|k| seen(k, &state.to_array()));
+    }
 }
 
 /// Predicted − measured states, in the units of the state, with roll wrapped to ±π. The weak form and the report use the

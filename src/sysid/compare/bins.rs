@@ -19,7 +19,7 @@ const MAP_BINS: f64 = 10.0;
 
 /// Residual of one channel in one window, with the regime variables in the window.
 #[derive(Clone, Copy, Debug)]
-pub struct Residual {
+pub struct Residual<'a> {
     /// Measured minus predicted value, in the channel's unit.
     pub value: f64,
     /// Measured value, in the channel's unit.
@@ -29,23 +29,23 @@ pub struct Residual {
     /// Index of the block of windows that the bootstrap resamples together, ascending over all flights.
     pub block: usize,
     /// Values of the regime variables, in the order and units of [`RegimeVariable::CONTINUOUS`].
-    pub regime: [f64; RegimeVariable::CONTINUOUS.len()],
+    pub regime: &'a [f64; RegimeVariable::CONTINUOUS.len()],
     /// Number of independent samples that the window represents: distance between two windows divided by the kernel's length.
     pub weight: f64,
     /// Change of the residual if a sensor error of the flight changes by one standard deviation, in the channel's unit. There
     /// is one value for each sensor error.
-    pub shift: Shift,
+    pub shift: &'a Shift,
 }
 
 /// The finite residuals of `channel` over all flights. For each flight, `series` has the measured and predicted channels, and
 /// `shifts` the changes of their residuals due to sensor errors.
-pub fn residuals(
+pub fn residuals<'a>(
     channel: ChannelId,
-    flights: &[Prepared],
+    flights: &'a [Prepared],
     series: &[Vec<Series>],
-    shifts: &[Vec<[Shift; ChannelId::ALL.len()]>],
-) -> Vec<Residual> {
-    let mut all: Vec<Residual> = Vec::new();
+    shifts: &'a [Vec<[Shift; ChannelId::ALL.len()]>],
+) -> Vec<Residual<'a>> {
+    let mut all = Vec::new();
     let (mut block, mut last) = (0, None);
     let place = ChannelId::ALL.iter().position(|id| *id == channel).unwrap_or_default();
     for (flight, (prepared, lists)) in flights.iter().zip(series).enumerate() {
@@ -59,8 +59,7 @@ pub fn residuals(
             }
             let (measured, value) = (list.measured[k], list.measured[k] - list.predicted[k]);
             if value.is_finite() {
-                let regime = window.regime;
-                let shift = shifts[flight][k][place];
+                let (regime, shift) = (&window.regime, &shifts[flight][k][place]);
                 all.push(Residual { value, measured, flight, block, regime, weight, shift });
             }
         }
@@ -69,7 +68,7 @@ pub fn residuals(
 }
 
 /// Number of independent samples in `residuals`, rounded down.
-pub fn independent<'a>(residuals: impl Iterator<Item = &'a Residual>) -> usize {
+pub fn independent<'r, 'a: 'r>(residuals: impl Iterator<Item = &'r Residual<'a>>) -> usize {
     residuals.map(|r| r.weight).sum::<f64>().floor() as usize
 }
 
@@ -77,12 +76,12 @@ pub fn independent<'a>(residuals: impl Iterator<Item = &'a Residual>) -> usize {
 ///
 /// The interval is that of the block bootstrap, widened by the uncertainty of the sensor errors. `seed` and `path` select
 /// the random stream of the bootstrap.
-pub fn mean_interval<'a>(
-    residuals: impl Iterator<Item = &'a Residual> + Clone,
+pub fn mean_interval<'r, 'a: 'r>(
+    residuals: impl Iterator<Item = &'r Residual<'a>> + Clone,
     seed: u64,
     path: &[u64],
 ) -> (f64, [f64; 2]) {
-    let doubt = NORMAL_95 * doubt::deviation(residuals.clone().map(|r| (r.flight, &r.shift)));
+    let doubt = NORMAL_95 * doubt::deviation(residuals.clone().map(|r| (r.flight, r.shift)));
     let blocks = bootstrap::blocks(residuals.map(|r| (r.block, r.value)));
     let sum = blocks
         .iter()
@@ -300,13 +299,17 @@ mod tests {
 
     #[test]
     fn a_step_over_alpha_is_explained_by_alpha_and_not_by_time() {
-        let residual = |i: usize| {
+        let regime = |i: usize| {
             // alpha runs through its values in another order than time, so that the two are not correlated
-            let alpha = (i * 37 % 100) as f64 / 10.0;
             let mut regime = [0.0; 13];
-            (regime[0], regime[12]) = (alpha, i as f64);
-            let value = if alpha > 8.0 { 4.0 } else { 0.0 };
-            let shift = Shift::default();
+            (regime[0], regime[12]) = ((i * 37 % 100) as f64 / 10.0, i as f64);
+            regime
+        };
+        let regimes: Vec<[f64; 13]> = (0..400).map(regime).collect();
+        let shift = &Shift::default();
+        let residual = |i: usize| {
+            let regime = &regimes[i];
+            let value = if regime[0] > 8.0 { 4.0 } else { 0.0 };
             Residual { value, measured: 10.0, flight: 0, block: i / 5, regime, weight: 0.5, shift }
         };
         let residuals: Vec<Residual> = (0..400).map(residual).collect();

@@ -29,6 +29,9 @@ pub fn result(flight: &Prepared, from: &Reconstruction) -> FlightResult {
 
 fn trace(flight: &Prepared) -> FlightTrace {
     let mut trace = FlightTrace::default();
+    let rows = flight.sample_count() + flight.segments.len();
+    trace.time_s.reserve_exact(rows);
+    trace.states.iter_mut().chain(&mut trace.controls).for_each(|list| list.reserve_exact(rows));
     for segment in &flight.segments {
         for i in segment {
             let z = i.controls;

@@ -286,7 +286,7 @@ fn channel(
     let power = Power::of(residuals, noise(id, series));
     let found = finding::worst(residuals, &bins, flights, seed, number);
     let within_doubt = (power.residual - power.noise).max(0.0).sqrt()
-        < doubt::NORMAL_95 * doubt::level(residuals.iter().map(|r| &r.shift));
+        < doubt::NORMAL_95 * doubt::level(residuals.iter().map(|r| r.shift));
     let unexplained = power.unexplained();
     let unknown = unknown(&power);
     let abstained = match found {

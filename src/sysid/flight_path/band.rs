@@ -6,6 +6,12 @@
 //! stretch of flight is eliminated from both ends towards its middle in parallel. The number of operations is the same as in
 //! sequence.
 
+mod blocks;
+
+pub use blocks::{add_gram, add_upper_gram};
+
+use blocks::{BLOCK, add, cholesky, forward, subtract_gram, subtract_products, transposed};
+
 /// Square block of one instant's unknowns.
 pub type Block<const N: usize> = [[f64; N]; N];
 /// Matrix of one instant's unknowns (rows) by the constants (columns), with the right-hand side in the last column.
@@ -62,15 +68,10 @@ impl<const W: usize> Left<W> {
     /// Subtracts the contribution of an eliminated instant from the upper triangle; `mirror` completes the lower one.
     fn take<const N: usize>(&mut self, done: &Eliminated<N, W>) {
         // The corner takes most of the computing time. It is symmetric, so for each row the columns to the left of its own block
-        // of eight columns are skipped.
+        // are skipped.
         for (i, sums) in self.corner.iter_mut().enumerate() {
-            let from = i / 8 * 8;
-            for row in &done.rest {
-                let by = row[i];
-                for (sum, x) in sums[from..].iter_mut().zip(&row[from..]) {
-                    *sum -= by * x;
-                }
-            }
+            let by: [f64; N] = std::array::from_fn(|k| done.rest[k][i]);
+            subtract_products(sums, &by, &done.rest, i / BLOCK * BLOCK);
         }
         self.log_det += 2.0 * (0..N).map(|i| done.factor[i][i]).product::<f64>().ln();
     }
@@ -135,74 +136,10 @@ pub struct Stretch<const N: usize, const W: usize> {
 pub trait Equations<const N: usize, const W: usize>: Sync {
     /// Number of instants of the stretch.
     fn count(&self) -> usize;
-    /// Adds the equations of instant `k` to `node` and, if the constants are asked for, to their `corner`.
+    /// Adds the equations of instant `k` to `node` and, if the constants are asked for, to the upper triangle of their `corner`.
     fn instant(&self, k: usize, node: &mut Node<N, W>, corner: Option<&mut Corner<W>>);
-    /// The equations that couple instant `k` to the next one; the part of the constants goes to `corner`.
+    /// The equations that couple instant `k` to the next one; the part of the constants goes to the upper triangle of `corner`.
     fn link(&self, k: usize, corner: Option<&mut Corner<W>>) -> Link<N, W>;
-}
-
-/// Adds the product xᵀ y to `into`.
-pub fn add_gram<const R: usize, const A: usize, const B: usize>(
-    into: &mut [[f64; B]; A],
-    x: &[[f64; A]; R],
-    y: &[[f64; B]; R],
-) {
-    for (i, row) in into.iter_mut().enumerate() {
-        for (x, y) in x.iter().zip(y) {
-            for (sum, y) in row.iter_mut().zip(y) {
-                *sum += x[i] * y;
-            }
-        }
-    }
-}
-
-fn subtract_gram<const R: usize, const A: usize, const B: usize>(
-    into: &mut [[f64; B]; A],
-    x: &[[f64; A]; R],
-    y: &[[f64; B]; R],
-) {
-    for (i, row) in into.iter_mut().enumerate() {
-        for (x, y) in x.iter().zip(y) {
-            for (sum, y) in row.iter_mut().zip(y) {
-                *sum -= x[i] * y;
-            }
-        }
-    }
-}
-
-fn add<const A: usize, const B: usize>(into: &mut [[f64; B]; A], other: &[[f64; B]; A]) {
-    for (row, other) in into.iter_mut().zip(other) {
-        row.iter_mut().zip(other).for_each(|(x, y)| *x += y);
-    }
-}
-
-/// Lower Cholesky factor L with L Lᵀ = `a`; `None` if `a` is not positive definite.
-fn cholesky<const N: usize>(a: &Block<N>) -> Option<Block<N>> {
-    let mut l = [[0.0; N]; N];
-    for i in 0..N {
-        for j in 0..=i {
-            let dot: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
-            let left = a[i][j] - dot;
-            l[i][j] = if i == j { left.sqrt() } else { left / l[j][j] };
-        }
-        if !(l[i][i].is_finite() && l[i][i] > 0.0) {
-            return None;
-        }
-    }
-    Some(l)
-}
-
-/// Solves L x = `y` and replaces `y` by the solution x.
-fn forward<const N: usize, const W: usize>(l: &Block<N>, y: &mut Wide<N, W>) {
-    for (i, by) in l.iter().enumerate() {
-        let (done, rest) = y.split_at_mut(i);
-        let row = &mut rest[0];
-        for (by, done) in by.iter().zip(done.iter()) {
-            row.iter_mut().zip(done).for_each(|(x, d)| *x -= by * d);
-        }
-        let scale = by[i].recip();
-        row.iter_mut().for_each(|x| *x *= scale);
-    }
 }
 
 /// Eliminates one instant that is coupled with one neighbour; `None` if its block is not positive definite.
@@ -218,10 +155,6 @@ fn one<const N: usize, const W: usize>(
     subtract_gram(&mut neighbour.own, &next, &next);
     subtract_gram(&mut neighbour.rest, &next, &rest);
     Some(Eliminated { factor, next, rest })
-}
-
-fn transposed<const N: usize>(a: &Block<N>) -> Block<N> {
-    std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
 }
 
 /// Direction in which a side is eliminated.

@@ -1,6 +1,7 @@
 //! One channel (column) of a log: its finite samples in time order, and their interpolation.
 
 use std::ops::{Add, Mul, Sub};
+use std::sync::Arc;
 
 use greylag_num::statistics::quantile;
 
@@ -23,7 +24,7 @@ pub enum Interpolation {
 /// Finite samples of a channel.
 #[derive(Clone, Debug)]
 pub struct Channel {
-    time: Vec<f64>,
+    time: Arc<Vec<f64>>,
     value: Vec<f64>,
     /// Whether the channel has more than 20 values and all of them are equal. Always false for `Interpolation::Kept`.
     pub stuck: bool,
@@ -52,10 +53,21 @@ impl Channel {
             let mut kept = keep.iter();
             value.retain(|_| *kept.next().unwrap_or(&true));
         }
+        time.shrink_to_fit();
+        value.shrink_to_fit();
         if kind == Interpolation::Angle {
             unwrap(&mut value);
         }
-        Channel { time, value, stuck }
+        Channel { time: Arc::new(time), value, stuck }
+    }
+
+    /// The channel with the list of times of `other`, if its own times are the same. In a long log, equal lists would take as
+    /// much memory as the values.
+    pub fn sharing(mut self, other: &Channel) -> Channel {
+        if self.time == other.time {
+            self.time = Arc::clone(&other.time);
+        }
+        self
     }
 
     /// Whether the channel has no samples.

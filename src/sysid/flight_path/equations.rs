@@ -14,7 +14,7 @@ use crate::flight_path::band::{self, Keep, Left, Stretch};
 use crate::flight_path::intake::{Log, Track};
 use crate::flight_path::kinematics::{Drive, MOTION, MOTION_AND_GUST};
 use crate::flight_path::levels::Levels;
-use crate::flight_path::measurement::{self, AT, Others, Reading};
+use crate::flight_path::measurement::{self, AT, Others, Predicted, Reading};
 use crate::flight_path::nuisance::{self, COUNT, INERTIAL, Values, WIND};
 use crate::flight_path::path::{CHANNELS, Path};
 use crate::flight_path::{Options, ReconstructError, noise};
@@ -81,27 +81,43 @@ impl Problem<'_> {
     }
 
     /// The function that the line search minimises: −2 ln L of the path and the constants, where L is the likelihood with the
-    /// prior. The noise levels are fixed, and terms that depend only on them are left out.
-    pub fn merit(&self, found: &Found, bound: f64) -> f64 {
+    /// prior. The noise levels are fixed, and terms that depend only on them are left out. `readings` are those of `found`, for
+    /// each stretch, if they are known.
+    pub fn merit(&self, found: &Found, bound: f64, readings: Option<&[Vec<Reading>]>) -> f64 {
         let before = |i: usize| ((found.values[i] - self.means[i]) / self.widths[i]).powi(2);
-        let pairs = self.log.tracks.par_iter().zip(&found.paths);
-        let tracks: Vec<f64> =
-            pairs.map(|(track, path)| self.misfit_of(track, path, found, bound)).collect();
+        let pairs = self.log.tracks.par_iter().zip(&found.paths).enumerate();
+        let one = |(k, pair): (usize, (&Track, &Path))| {
+            self.misfit_of(pair, found, bound, readings.map(|all| all[k].as_slice()))
+        };
+        let tracks: Vec<f64> = pairs.map(one).collect();
         tracks.iter().sum::<f64>() + (0..COUNT).map(before).sum::<f64>()
     }
 
-    fn misfit_of(&self, track: &Track, path: &Path, found: &Found, bound: f64) -> f64 {
+    fn misfit_of(
+        &self,
+        (track, path): (&Track, &Path),
+        found: &Found,
+        bound: f64,
+        readings: Option<&[Reading]>,
+    ) -> f64 {
         let (step, gravity) = (self.log.step, self.options.gravity);
         let (values, l) = (&found.values, &found.levels);
-        let readings =
-            measurement::readings(track, path, values, step, self.log.sensors.vanes_at());
-        let drive = Drive::new(track, values, step, self.sampling, gravity);
         let spread: [f64; CHANNELS] = std::array::from_fn(|i| l.measured[i] * l.colour[i]);
+        let of = |r: &Reading| -> f64 {
+            let sizes = (0..CHANNELS).map(|i| (r.residual[i] / spread[i]).abs());
+            sizes.filter(|size| !size.is_nan()).map(|size| huber(size, bound)).sum()
+        };
+        let measured: f64 = match readings {
+            Some(readings) => readings.iter().map(of).sum(),
+            None => {
+                // the readings of a long flight would take much memory
+                let vanes_at = self.log.sensors.vanes_at();
+                let predicted = Predicted::new(track, path, values, step, vanes_at);
+                (0..path.len()).map(|k| of(&predicted.reading(k))).sum()
+            }
+        };
+        let drive = Drive::new(track, values, step, self.sampling, gravity);
         let sd = step_deviations::<MOTION>(l, step);
-        let size = |r: &Reading, i: usize| (r.residual[i] / spread[i]).abs();
-        let measured = readings.iter().flat_map(|r| (0..CHANNELS).map(move |i| size(r, i)));
-        let measured: f64 =
-            measured.filter(|size| !size.is_nan()).map(|size| huber(size, bound)).sum();
         let between = (0..path.len().saturating_sub(1)).map(|k| {
             let left = drive.step::<MOTION, 1>(path, values, k, step, gravity).rest;
             (0..MOTION).map(|i| huber((left[i][0] / sd[i]).abs(), PROCESS * bound)).sum::<f64>()

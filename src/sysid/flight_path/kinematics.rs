@@ -86,29 +86,35 @@ impl Drive {
         };
         let scaled: Vec<[f64; 3]> =
             track.force.iter().map(|f| nuisance::without_gain(values, FORCE_GAIN, *f)).collect();
-        let (force, slope) = shifted(&scaled, values[SKEW_FORCE] / step);
+        let late = values[SKEW_FORCE] / step;
         let has_force = track.force.first().is_some_and(|f| f[0].is_finite());
         let (start, span) = (track.start, track.span);
-        let mut drive = Drive { rate: vec![], force: vec![], force_by_skew: vec![], start, span };
+        let [rate, force, force_by_skew] = std::array::from_fn(|_| Vec::with_capacity(n - 1));
+        let mut drive = Drive { rate, force, force_by_skew, start, span };
+        let (mut before, mut now) = (gyro(0), gyro(0));
         for k in 0..n - 1 {
+            let after = gyro(k + 1);
             let (rate, mean): (_, [(Matrix3<f64>, usize, f64); 2]) = match sampling {
                 Sampling::Held => {
-                    let before = k.saturating_sub(1);
-                    let back = exp(&(gyro(before) * -step));
-                    (gyro(k), [(Matrix3::identity(), k, 1.5), (back, before, -0.5)])
+                    let back = exp(&(before * -step));
+                    (now, [(Matrix3::identity(), k, 1.5), (back, k.saturating_sub(1), -0.5)])
                 }
                 Sampling::Instants => {
-                    let rate = (gyro(k) + gyro(k + 1)) * 0.5;
+                    let rate = (now + after) * 0.5;
                     let on = exp(&(rate * step));
                     (rate, [(Matrix3::identity(), k, 0.5), (on, k + 1, 0.5)])
                 }
             };
-            let mix = |of: &[Vector3<f64>]| {
-                mean.iter().map(|(r, i, share)| r * of[*i] * *share).sum::<Vector3<f64>>()
-            };
+            let (mut force, mut slope) = (Vector3::<f64>::zeros(), Vector3::<f64>::zeros());
+            for (r, i, share) in mean.iter().filter(|_| has_force) {
+                let (own, by_late) = without_delay(&scaled, late, *i);
+                force += r * own * *share;
+                slope += r * by_late * *share;
+            }
             drive.rate.push(rate);
-            drive.force.push(if has_force { mix(&force) } else { weight(track, k, gravity) });
-            drive.force_by_skew.push(if has_force { mix(&slope) / step } else { Vector3::zeros() });
+            drive.force.push(if has_force { force } else { weight(track, k, gravity) });
+            drive.force_by_skew.push(slope / step);
+            (before, now) = (now, after);
         }
         drive
     }
@@ -181,18 +187,19 @@ fn weight(track: &Track, k: usize, gravity: f64) -> Vector3<f64> {
     r.transpose() * Vector3::new(0.0, 0.0, -gravity)
 }
 
-/// Removes a delay of `late` sampling intervals from `samples`. Returns the shifted samples, and their derivatives with respect
-/// to the delay, per sampling interval. The interpolation is cubic, from four samples.
-pub fn shifted(samples: &[[f64; 3]], late: f64) -> (Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
+/// Removes a delay of `late` sampling intervals from `samples`.
+pub fn shifted(samples: &[[f64; 3]], late: f64) -> Vec<Vector3<f64>> {
+    (0..samples.len()).map(|k| without_delay(samples, late, k).0).collect()
+}
+
+/// Sample `k` of `samples` without a delay of `late` sampling intervals, and its derivative with respect to the delay, per
+/// sampling interval. The interpolation is cubic, from four samples.
+fn without_delay(samples: &[[f64; 3]], late: f64, k: usize) -> (Vector3<f64>, Vector3<f64>) {
     let last = samples.len() as isize - 1;
     let at = |i: isize| Vector3::from(samples[i.clamp(0, last) as usize]);
     let whole = late.floor();
-    (0..=last)
-        .map(|k| {
-            let i = k + whole as isize;
-            cubic([i - 1, i, i + 1, i + 2].map(at), late - whole)
-        })
-        .unzip()
+    let i = k as isize + whole as isize;
+    cubic([i - 1, i, i + 1, i + 2].map(at), late - whole)
 }
 
 #[cfg(test)]
@@ -204,11 +211,10 @@ mod tests {
         // a parabola is interpolated exactly
         let f = |t: f64| 0.3 + 0.2 * t - 0.05 * t * t;
         let samples: Vec<[f64; 3]> = (0..20).map(|k| [f(k as f64 - 0.7); 3]).collect();
-        let (shifted, slope) = shifted(&samples, 0.7);
         for k in 3..15 {
-            let t = k as f64;
-            assert!((shifted[k].x - f(t)).abs() < 1e-12);
-            assert!((slope[k].x - (0.2 - 0.1 * t)).abs() < 1e-12);
+            let (t, (shifted, slope)) = (k as f64, without_delay(&samples, 0.7, k));
+            assert!((shifted.x - f(t)).abs() < 1e-12);
+            assert!((slope.x - (0.2 - 0.1 * t)).abs() < 1e-12);
         }
     }
 
@@ -216,8 +222,7 @@ mod tests {
     fn lateness_of_rough_samples_has_no_step() {
         let samples: Vec<[f64; 3]> = (0..20).map(|k| [f64::from(k * k % 7); 3]).collect();
         for half in [-0.5, 0.5, 1.5, 2.0] {
-            let (before, after) =
-                (shifted(&samples, half - 1e-9).0, shifted(&samples, half + 1e-9).0);
+            let (before, after) = (shifted(&samples, half - 1e-9), shifted(&samples, half + 1e-9));
             assert!(before.iter().zip(&after).all(|(a, b)| (a - b).norm() < 1e-6), "{half}");
         }
     }

@@ -6,7 +6,7 @@
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use crate::flight_path::band::{Corner, Node, add_gram};
+use crate::flight_path::band::{Corner, Node, add_gram, add_upper_gram};
 use crate::flight_path::channel::{cubic, wrap};
 use crate::flight_path::intake::Track;
 use crate::flight_path::kinematics::MOTION_AND_GUST;
@@ -109,37 +109,60 @@ pub fn readings(
     step: f64,
     vanes_at: Option<[f64; 3]>,
 ) -> Vec<Reading> {
-    let none = Reading { residual: [f64::NAN; CHANNELS], by_late: [0.0; CHANNELS] };
-    let n = path.len();
-    let shown: Vec<[f64; CHANNELS]> = (0..n)
-        .into_par_iter()
-        .with_min_len(1000)
-        .map(|k| shown(path, k, &track.rates[k], vanes_at))
-        .collect();
-    let read = |j: usize| {
-        let mut reading = none;
+    let predicted = Predicted::new(track, path, values, step, vanes_at);
+    let samples = (0..path.len()).into_par_iter().with_min_len(1000);
+    samples.map(|k| predicted.reading(k)).collect()
+}
+
+/// Predictions for the sensors along a path, from which the readings follow.
+pub struct Predicted<'a> {
+    track: &'a Track,
+    values: &'a Values,
+    /// Sampling interval, s.
+    step: f64,
+    /// Values of error-free sensors at every sample.
+    shown: Vec<[f64; CHANNELS]>,
+}
+
+impl<'a> Predicted<'a> {
+    /// Predictions with the sensor errors `values`. The other arguments are those of [`readings`].
+    pub fn new(
+        track: &'a Track,
+        path: &Path,
+        values: &'a Values,
+        step: f64,
+        vanes_at: Option<[f64; 3]>,
+    ) -> Predicted<'a> {
+        let samples = (0..path.len()).into_par_iter().with_min_len(1000);
+        let shown = samples.map(|k| shown(path, k, &track.rates[k], vanes_at)).collect();
+        Predicted { track, values, step, shown }
+    }
+
+    /// The reading at sample `j`.
+    pub fn reading(&self, j: usize) -> Reading {
+        let mut reading = Reading { residual: [f64::NAN; CHANNELS], by_late: [0.0; CHANNELS] };
+        let n = self.shown.len();
         if j == 0 || j + 1 >= n {
             return reading;
         }
         for channel in 0..CHANNELS {
-            let late = values[skew_of(channel)] / step;
+            let late = self.values[skew_of(channel)] / self.step;
             let whole = late.round();
             let data = j as isize + whole as isize;
             if data < 0 || data as usize >= n {
                 continue;
             }
-            let y = measured(track, channel, data as usize);
+            let y = measured(self.track, channel, data as usize);
             if y.is_nan() {
                 continue;
             }
-            let (h, slope) = seen_at(&shown, channel, j, whole - late);
-            let (h, gain) = with_errors(channel, h, values);
+            let (h, slope) = seen_at(&self.shown, channel, j, whole - late);
+            let (h, gain) = with_errors(channel, h, self.values);
             reading.residual[channel] = turn(channel, y - h);
-            reading.by_late[channel] = -gain * slope / step;
+            reading.by_late[channel] = -gain * slope / self.step;
         }
         reading
-    };
-    (0..n).into_par_iter().with_min_len(1000).map(read).collect()
+    }
 }
 
 /// Value of an error-free sensor at the time `part` sampling intervals after sample `j`, and its slope per sampling interval.
@@ -211,7 +234,7 @@ pub fn add<const N: usize, const W: usize, const M: usize>(
     }
     let Some(corner) = corner else { return };
     let mut own = [[0.0; M]; M];
-    add_gram(&mut own, &rests, &rests);
+    add_upper_gram(&mut own, &rests);
     for (i, own) in own.iter().enumerate() {
         spill(&mut corner[if i + 1 == M { W - 1 } else { i }], own);
     }

@@ -56,10 +56,12 @@ const DRAWS: usize = 3;
 /// [`ReconstructError::NoPath`] if the equations of the simulated path errors are singular.
 pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, ReconstructError> {
     let Problem { log, options, .. } = *problem;
-    let segments = path_as_segments(problem, found, &found.paths, None);
     let mut nuisances = nuisances(problem, found);
     let mut notes = log.notes.clone();
     declare(problem, found, &nuisances, &mut notes);
+    // before the flight itself, because the copies take as much memory
+    let (left, erring) = draws(problem, found)?;
+    let segments = path_as_segments(problem, found, &found.paths, None);
     let finite = |i: &Instant| i.specific_force.iter().all(|f| f.is_finite());
     if !log.has.force {
         notes.push(match segments.iter().flat_map(|s| &s.instants).any(finite) {
@@ -71,7 +73,6 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
                 .into(),
         });
     }
-    let (left, erring) = draws(problem, found, &segments)?;
     nuisances.extend(unmeasured_angles(problem, found, &segments, &left));
     let own = actuator_skew::by_axis(&segments, log.step, problem.sampling);
     let skew = actuator_skew::estimate(own, &erring, log.step, found.levels.gusts);
@@ -144,12 +145,10 @@ fn left_as_recorded(skew: &Skew) -> String {
 
 /// Simulates the error of the path in random copies of the flight. Returns the root mean square error of each state, and the
 /// actuator delays that are estimated from each copy. The returned errors of the body rates are the noise levels of the gyros.
-fn draws(
-    problem: &Problem,
-    found: &Found,
-    segments: &[Segment],
-) -> Result<([f64; 8], Vec<ByAxis>), ReconstructError> {
+fn draws(problem: &Problem, found: &Found) -> Result<([f64; 8], Vec<ByAxis>), ReconstructError> {
     let singular = || no_path(&problem.options.name, "the equations became singular");
+    let all = |path: &Path| (0..path.len()).map(|k| drawn(path, k)).collect::<Vec<_>>();
+    let own: Vec<Vec<[f64; DRAWN.len()]>> = found.paths.iter().map(all).collect();
     let mut random = stream(0, &[]);
     let (mut squares, mut count, mut delays) = ([0.0; 8], 0.0_f64, Vec::new());
     for _ in 0..DRAWS {
@@ -157,12 +156,12 @@ fn draws(
         let erring = problem.erring(found, &mut random).ok_or_else(singular)?;
         let copy = path_as_segments(problem, found, &erring.paths, Some(&erring.gyro));
         drop(erring);
-        let pairs = segments.iter().zip(&copy);
-        for (a, b) in pairs.flat_map(|(a, b)| a.instants.iter().zip(&b.instants)) {
-            let (a, b) = (a.state.to_array(), b.state.to_array());
-            for (i, sum) in squares.iter_mut().enumerate() {
-                let error = if i == 0 { wrap(b[i] - a[i]) } else { b[i] - a[i] };
-                *sum += error * error;
+        let pairs = own.iter().zip(&copy);
+        for (a, b) in pairs.flat_map(|(a, b)| a.iter().zip(&b.instants)) {
+            let b = b.state.to_array();
+            for (a, i) in a.iter().zip(DRAWN) {
+                let error = if i == 0 { wrap(b[i] - a) } else { b[i] - a };
+                squares[i] += error * error;
             }
             count += 1.0;
         }
@@ -171,6 +170,17 @@ fn draws(
     let mut left = squares.map(|sum| (sum / count).sqrt());
     left[3..6].copy_from_slice(&found.levels.gyro);
     Ok((left, delays))
+}
+
+/// Indices of the states that have a drawn error: roll, pitch, airspeed, α, β.
+const DRAWN: [usize; 5] = [0, 1, 2, 6, 7];
+
+/// These states of `path` at sample `k`.
+fn drawn(path: &Path, k: usize) -> [f64; DRAWN.len()] {
+    let [roll, pitch, _] = to_euler(&path.attitude[k]);
+    let air = path.air_velocity(k);
+    let [alpha, beta] = flow_angles(&air);
+    [roll, pitch, air.norm(), alpha, beta]
 }
 
 /// Makes segments with the states of `paths`. If the noise `gyro` (rad/s) is given, it is added to the body rates.
@@ -198,7 +208,7 @@ fn segment(
     gyro: Option<&[[f64; 3]]>,
 ) -> Segment {
     let force = match log.has.force {
-        true => shifted(&track.force, values[SKEW_FORCE] / log.step).0,
+        true => shifted(&track.force, values[SKEW_FORCE] / log.step),
         false => path_force(track, path, log, gravity),
     };
     let instant = |k: usize| {

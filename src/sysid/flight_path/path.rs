@@ -49,7 +49,9 @@ impl Path {
             }
         };
         let (gust, wind) = (vec![Vector3::zeros(); track.len()], Vector3::zeros());
-        let mut path = Path { attitude: Vec::new(), velocity: Vec::new(), gust, wind };
+        let (attitude, velocity) =
+            (Vec::with_capacity(track.len()), Vec::with_capacity(track.len()));
+        let mut path = Path { attitude, velocity, gust, wind };
         for k in 0..track.len() {
             for (angle, measured) in angles.iter_mut().zip(track.attitude[k]) {
                 keep(measured, angle);

@@ -93,12 +93,12 @@ fn search(
     solved: &Solved<MOTION>,
     bound: f64,
 ) -> Result<f64, ReconstructError> {
-    let before = problem.merit(found, bound);
+    let before = problem.merit(found, bound, Some(solved.readings.as_slice()));
     let mut part = 1.0;
     while part >= LEAST_PART {
         let mut trial = found.clone();
         let moved = solved.apply(&mut trial, part, &problem.options.name)?;
-        if problem.merit(&trial, bound) <= before {
+        if problem.merit(&trial, bound, None) <= before {
             *found = trial;
             return Ok(moved);
         }

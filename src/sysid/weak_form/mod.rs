@@ -2,6 +2,7 @@
 //! parts over a window of flight. No measured signal has to be differentiated.
 
 pub(super) mod channels;
+pub mod columns;
 pub mod kernel;
 pub mod prepared;
 pub mod windows;

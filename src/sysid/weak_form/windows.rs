@@ -6,6 +6,8 @@
 
 use rayon::prelude::*;
 
+pub use crate::weak_form::columns::{Columns, columns};
+
 use crate::flight_path::reconstruction::Instant;
 use crate::weak_form::channels::ChannelId;
 use crate::weak_form::kernel::{Kernel, weigh};
@@ -18,8 +20,8 @@ use greylag_physics::{AirData, Channel, State, Wrench};
 
 /// Approximate number of windows of a flight in which the sensitivity to sensor noise is evaluated.
 const NOISE_WINDOWS: usize = 40;
-/// Number of windows whose columns one thread computes at a time.
-const CHUNK: usize = 64;
+/// Number of windows that one thread computes at a time.
+pub(super) const CHUNK: usize = 64;
 
 /// One channel of one flight.
 #[derive(Clone, Debug)]
@@ -44,10 +46,11 @@ pub fn channels(model: &GreyBox, flight: &Prepared) -> Vec<Series> {
         .iter()
         .map(|s| one_step_rates(&flight.stepping(model), s, flight))
         .collect();
+    let mut loads = Loads::default();
     let both: Vec<[[f64; 2]; 9]> = flight
         .windows
         .iter()
-        .map(|w| window(model, flight, w, &steps[w.segment][w.start..]))
+        .map(|w| window(model, flight, w, &mut loads, &steps[w.segment][w.start..]))
         .collect();
     let noise = noise_variance(model, flight);
     let series = |(k, &channel): (usize, &ChannelId)| Series {
@@ -66,11 +69,15 @@ pub fn channels(model: &GreyBox, flight: &Prepared) -> Vec<Series> {
 /// [`channels`].
 pub fn force_and_moment_residuals(model: &GreyBox, flight: &Prepared) -> Vec<[f64; 6]> {
     let flight = &*flight.acting(model);
-    let residual = |w: &Window| {
-        let both = forces_and_moments(model, flight, w);
-        std::array::from_fn(|k| both[k][0] - both[k][1])
+    let residuals = |windows: &[Window]| -> Vec<[f64; 6]> {
+        let mut loads = Loads::default();
+        let residual = |w: &Window| {
+            let both = forces_and_moments(model, flight, w, &mut loads);
+            std::array::from_fn(|k| both[k][0] - both[k][1])
+        };
+        windows.iter().map(residual).collect()
     };
-    flight.windows.par_iter().map(residual).collect()
+    flight.windows.par_chunks(CHUNK).flat_map_iter(residuals).collect()
 }
 
 /// Pairs of measured and predicted value in one window, in the order of [`ChannelId::ALL`].
@@ -78,11 +85,12 @@ fn window(
     model: &GreyBox,
     flight: &Prepared,
     window: &Window,
+    loads: &mut Loads,
     rates: &[Vector<f64>],
 ) -> [[f64; 2]; 9] {
     let (kernel, samples) = (&flight.kernel, flight.samples(window));
     let mut both = [[f64::NAN; 2]; 9];
-    both[..6].copy_from_slice(&forces_and_moments(model, flight, window));
+    both[..6].copy_from_slice(&forces_and_moments(model, flight, window, loads));
     let slope = |of: fn(&State) -> f64| weigh(&kernel.slope, samples.iter().map(|i| of(&i.state)));
     let measured = [slope(|s| s.airspeed), slope(|s| s.alpha), slope(|s| s.beta)];
     set(&mut both[6..], measured, smooth(&kernel.step, rates.iter().copied()));
@@ -90,23 +98,93 @@ fn window(
 }
 
 /// The first six channels of [`window`].
-fn forces_and_moments(model: &GreyBox, flight: &Prepared, window: &Window) -> [[f64; 2]; 6] {
+fn forces_and_moments(
+    model: &GreyBox,
+    flight: &Prepared,
+    window: &Window,
+    loads: &mut Loads,
+) -> [[f64; 2]; 6] {
     let (kernel, samples) = (&flight.kernel, flight.samples(window));
+    let loads = loads.of(model, flight, window);
     let mut both = [[f64::NAN; 2]; 6];
     if flight.force_in(window) {
-        let measured = smooth(&kernel.sample, samples.iter().map(|i| measured_force(model, i)));
-        let predicted = smooth(&kernel.sample, samples.iter().map(|i| predicted_force(model, i)));
+        let measured = smooth(&kernel.sample, loads.iter().map(|l| l.measured_force));
+        let predicted = smooth(&kernel.sample, loads.iter().map(|l| l.force));
         set(&mut both[..3], measured, predicted);
     }
-    let at_instants = flight.sampling == Sampling::Instants;
-    let average = |of: &dyn Fn(&Instant, &Instant) -> Vector<f64>| match at_instants {
-        true => smooth(&kernel.sample, samples.iter().map(|i| of(i, i))),
-        false => smooth(&kernel.step, steps(samples, model.integrator).map(|s| s.average(of))),
+    let (turning, predicted) = if flight.sampling == Sampling::Instants {
+        let part = |of: fn(&Load) -> Vector<f64>| smooth(&kernel.sample, loads.iter().map(of));
+        (part(|l| l.turning), part(|l| l.moment))
+    } else {
+        // explicit Euler uses the start of a step; RK4 uses both ends with the controls of the start
+        let at_end = |k: usize| match model.integrator {
+            Integrator::Jsbsim => None,
+            Integrator::Rk4 => Some([loads[k + 1].turning, moment(model, samples, k)]),
+        };
+        let step = |k: usize| {
+            let start = [loads[k].turning, loads[k].moment];
+            at_end(k).map_or(start, |end| [middle(start[0], end[0]), middle(start[1], end[1])])
+        };
+        let steps: Vec<[Vector<f64>; 2]> = (0..samples.len() - 1).map(step).collect();
+        let part =
+            |of: fn(&[Vector<f64>; 2]) -> Vector<f64>| smooth(&kernel.step, steps.iter().map(of));
+        (part(|s| s[0]), part(|s| s[1]))
     };
-    let turning = average(&|i, _| gyroscopic(&model.body, &i.state));
     let measured = measured_moment(model, samples, kernel, turning);
-    set(&mut both[3..6], measured, average(&|i, z| moment(model, i, z)));
+    set(&mut both[3..6], measured, predicted);
     both
+}
+
+/// Forces and moments at a sample.
+#[derive(Clone, Copy)]
+struct Load {
+    /// Measured and predicted D (less thrust), L and Y, N.
+    measured_force: Vector<f64>,
+    force: Vector<f64>,
+    /// Gyroscopic moment and predicted moment, N m.
+    turning: Vector<f64>,
+    moment: Vector<f64>,
+}
+
+impl Load {
+    fn at(model: &GreyBox, at: &Instant) -> Load {
+        let air = model.air(&at.state, at.altitude);
+        let wrench = model.wrench(&at.state, &at.controls, &air);
+        Load {
+            measured_force: measured_force(model, at, &air),
+            force: predicted_force(model, &wrench, &air),
+            turning: gyroscopic(&model.body, &at.state),
+            moment: moments(&wrench),
+        }
+    }
+}
+
+/// Forces and moments at the samples of a window. Those of samples that the next window also contains are kept for it.
+#[derive(Default)]
+struct Loads {
+    /// Segment and index of the first sample.
+    from: Option<(usize, usize)>,
+    all: Vec<Load>,
+}
+
+impl Loads {
+    /// The forces and moments at the samples of `window`. All calls must have the same `model` and `flight`.
+    fn of(&mut self, model: &GreyBox, flight: &Prepared, window: &Window) -> &[Load] {
+        let ahead = self.from.and_then(|(segment, start)| {
+            let ahead = window.start.checked_sub(start)?;
+            (segment == window.segment && ahead <= self.all.len()).then_some(ahead)
+        });
+        self.all.drain(..ahead.unwrap_or(self.all.len()));
+        let samples = flight.samples(window);
+        let known = self.all.len();
+        self.all.extend(samples[known..].iter().map(|at| Load::at(model, at)));
+        self.from = Some((window.segment, window.start));
+        &self.all
+    }
+}
+
+fn middle(a: Vector<f64>, b: Vector<f64>) -> Vector<f64> {
+    std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
 }
 
 fn set(both: &mut [[f64; 2]], measured: Vector<f64>, predicted: Vector<f64>) {
@@ -123,47 +201,14 @@ fn smooth(weights: &[f64], values: impl Iterator<Item = Vector<f64>>) -> Vector<
     sum
 }
 
-/// A step between two samples.
-struct Step<'a> {
-    from: &'a Instant,
-    /// End of the step if the integrator also evaluates the model there (RK4); otherwise `None`. The controls are those of
-    /// the start.
-    to: Option<&'a Instant>,
-}
-
-fn steps(samples: &[Instant], integrator: Integrator) -> impl Iterator<Item = Step<'_>> {
-    samples.windows(2).map(move |pair| Step {
-        from: &pair[0],
-        to: (integrator == Integrator::Rk4).then_some(&pair[1]),
-    })
-}
-
-impl Step<'_> {
-    /// Mean of `f(instant of the state, instant of the controls)` over the step. Explicit Euler uses the start of the step. RK4
-    /// uses both ends with the controls of the start.
-    fn average(&self, f: impl Fn(&Instant, &Instant) -> Vector<f64>) -> Vector<f64> {
-        let start = f(self.from, self.from);
-        match self.to {
-            None => start,
-            Some(to) => {
-                let end = f(to, self.from);
-                std::array::from_fn(|k| 0.5 * (start[k] + end[k]))
-            }
-        }
-    }
-}
-
 /// Measured D (less thrust), L and Y from the accelerometers, N.
-fn measured_force(model: &GreyBox, at: &Instant) -> Vector<f64> {
-    let air = model.air(&at.state, at.altitude);
+fn measured_force(model: &GreyBox, at: &Instant, air: &AirData) -> Vector<f64> {
     let force = at.specific_force.map(|f| f * model.body.mass);
-    to_force_axes(force, &air, model.axes)
+    to_force_axes(force, air, model.axes)
 }
 
-fn predicted_force(model: &GreyBox, at: &Instant) -> Vector<f64> {
-    let air = model.air(&at.state, at.altitude);
-    let wrench = model.wrench(&at.state, &at.controls, &air);
-    to_force_axes(rigid_body::body_force(&wrench, &air, model.axes), &air, model.axes)
+pub(super) fn predicted_force(model: &GreyBox, wrench: &Wrench, air: &AirData) -> Vector<f64> {
+    to_force_axes(rigid_body::body_force(wrench, air, model.axes), air, model.axes)
 }
 
 /// Converts a force in body axes, N, to D (less thrust), L and Y, N. The order is that of [`ChannelId::ALL`], whereas
@@ -206,9 +251,14 @@ pub(crate) fn gyroscopic<R: Real>(body: &RigidBody, state: &State<R>) -> Vector<
     [w[1] * h[2] - w[2] * h[1], w[2] * h[0] - w[0] * h[2], w[0] * h[1] - w[1] * h[0]]
 }
 
-fn moment(model: &GreyBox, at: &Instant, controls: &Instant) -> Vector<f64> {
-    let air = model.air(&at.state, at.altitude);
-    let wrench = model.wrench(&at.state, &controls.controls, &air);
+/// Predicted moment at the sample after `samples[k]`, with the controls of `samples[k]`.
+fn moment(model: &GreyBox, samples: &[Instant], k: usize) -> Vector<f64> {
+    let end = &samples[k + 1];
+    let air = model.air(&end.state, end.altitude);
+    moments(&model.wrench(&end.state, &samples[k].controls, &air))
+}
+
+fn moments(wrench: &Wrench) -> Vector<f64> {
     [Channel::Roll, Channel::Pitch, Channel::Yaw].map(|c| wrench.get(c))
 }
 
@@ -274,112 +324,11 @@ fn state_noise(model: &GreyBox, at: &Instant, noise: &[f64; 8]) -> [f64; 9] {
 /// Predicted value less the parts of the measured value that depend on the state. These parts are the specific force rotated
 /// by α and β, and the gyroscopic moment.
 pub(crate) fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
-    let (force, measured) = (predicted_force(model, at), measured_force(model, at));
+    let load = Load::at(model, at);
     let known = at.specific_force.iter().all(|f| f.is_finite());
-    let force = std::array::from_fn(|k| force[k] - if known { measured[k] } else { 0.0 });
+    let measured = if known { load.measured_force } else { [0.0; 3] };
     let rate = model.rate(&at.state, &at.controls, at.altitude);
-    let turning = gyroscopic(&model.body, &at.state);
-    let moment = moment(model, at, at);
-    let moment = std::array::from_fn(|k| moment[k] - turning[k]);
+    let force: Vector<f64> = std::array::from_fn(|k| load.force[k] - measured[k]);
+    let moment: Vector<f64> = std::array::from_fn(|k| load.moment[k] - load.turning[k]);
     std::array::from_fn(|k| [force, moment, [rate.airspeed, rate.alpha, rate.beta]][k / 3][k % 3])
-}
-
-/// Linear part of a model in weak form: the contribution of each coefficient per unit of the coefficient.
-#[derive(Clone, Debug)]
-pub struct Columns {
-    /// Names of the coefficients, as in the model.
-    pub names: Vec<String>,
-    /// Contributions `values[coefficient][channel][window]`, channels D, L, Y, l, m, n. Weighted by the coefficients,
-    /// their sum is [`Series::predicted`].
-    pub values: Vec<[Vec<f64>; 6]>,
-}
-
-/// Columns of `model` over the windows of `flight`, as regressors for the measured channels.
-///
-/// Columns of zeros belong to shape constants, in which the model is nonlinear, and to coefficients of effects on inputs or
-/// inertia, which act on the measured side.
-pub fn columns(model: &GreyBox, flight: &Prepared) -> Columns {
-    let flight = &*flight.acting(model);
-    let names: Vec<String> = model.coefficients().iter().map(|c| c.name.clone()).collect();
-    let parts: Vec<Vec<[Vec<f64>; 6]>> = flight
-        .windows
-        .par_chunks(CHUNK)
-        .map(|windows| columns_of(model, flight, windows, names.len()))
-        .collect();
-    let joined = |index: usize, channel: usize| {
-        parts.iter().flat_map(|part| &part[index][channel]).copied().collect()
-    };
-    let values = (0..names.len()).map(|index| std::array::from_fn(|k| joined(index, k))).collect();
-    Columns { names, values }
-}
-
-/// Values of [`Columns::values`] for some windows.
-fn columns_of(
-    model: &GreyBox,
-    flight: &Prepared,
-    windows: &[Window],
-    coefficients: usize,
-) -> Vec<[Vec<f64>; 6]> {
-    let mut values: Vec<[Vec<f64>; 6]> =
-        vec![std::array::from_fn(|_| vec![0.0; windows.len()]); coefficients];
-    for (w, window) in windows.iter().enumerate() {
-        let mut add = |index: usize, channel: usize, amount: f64| {
-            values[index][channel][w] += amount;
-        };
-        let samples = flight.samples(window);
-        for (weight, at) in flight.kernel.sample.iter().zip(samples) {
-            force_columns(model, at, *weight, &mut add);
-        }
-        if flight.sampling == Sampling::Instants {
-            for (weight, at) in flight.kernel.sample.iter().zip(samples) {
-                moment_columns(model, at, at, *weight, &mut add);
-            }
-            continue;
-        }
-        for (weight, step) in flight.kernel.step.iter().zip(steps(samples, model.integrator)) {
-            let part = if step.to.is_some() { 0.5 } else { 1.0 };
-            moment_columns(model, step.from, step.from, weight * part, &mut add);
-            if let Some(to) = step.to {
-                moment_columns(model, to, step.from, weight * part, &mut add);
-            }
-        }
-    }
-    values
-}
-
-fn force_columns(
-    model: &GreyBox,
-    at: &Instant,
-    weight: f64,
-    add: &mut impl FnMut(usize, usize, f64),
-) {
-    let air = model.air(&at.state, at.altitude);
-    model.contributions(&at.state, &at.controls, &air, |index, channel, amount: f64| {
-        if matches!(channel, Channel::Drag | Channel::Lift | Channel::Side | Channel::BodyX) {
-            let mut wrench = Wrench::zero();
-            wrench.add(channel, weight * amount);
-            let force = rigid_body::body_force(&wrench, &air, model.axes);
-            let force = to_force_axes(force, &air, model.axes);
-            (0..3).for_each(|k| add(index, k, force[k]));
-        }
-    });
-}
-
-fn moment_columns(
-    model: &GreyBox,
-    at: &Instant,
-    controls: &Instant,
-    weight: f64,
-    add: &mut impl FnMut(usize, usize, f64),
-) {
-    let air = model.air(&at.state, at.altitude);
-    model.contributions(&at.state, &controls.controls, &air, |index, channel, amount: f64| {
-        let place = match channel {
-            Channel::Roll => 3,
-            Channel::Pitch => 4,
-            Channel::Yaw => 5,
-            Channel::Drag | Channel::Lift | Channel::Side | Channel::BodyX => return,
-        };
-        add(index, place, weight * amount);
-    });
 }

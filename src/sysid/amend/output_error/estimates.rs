@@ -76,6 +76,7 @@ impl Search<'_> {
         self.free.retain(|_| keep.next().unwrap_or(true));
         let mut keep = out.iter().map(|held| !held);
         self.place.theta.retain(|_| keep.next().unwrap_or(true));
+        self.residuals = self.residuals_at(&self.place);
         self.change = (f64::INFINITY, 0);
         names
     }
@@ -173,7 +174,7 @@ impl Search<'_> {
             let by: f64 = (0..count).map(|k| weight(k) * value(k)).sum();
             [by, variance.max(0.0).sqrt()]
         };
-        let one = |(k, flight): (usize, &Flight)| {
+        let one = |(k, flight): (usize, &&Flight)| {
             let sd = &sd[place(k, 0)..place(k + 1, 0)];
             let own = &self.place.own[k];
             let mut fitted =
@@ -274,9 +275,8 @@ impl Search<'_> {
     }
 
     fn left(&self) -> Vec<Left> {
-        let residuals = self.residuals();
         let square = |r: &[[f64; 8]], k: usize| r.iter().map(|x| x[k] * x[k]).sum::<f64>();
-        let shots = self.shots.iter().zip(&residuals).zip(&self.place.starts);
+        let shots = self.shots.iter().zip(&self.residuals).zip(&self.place.starts);
         let one = |((shot, r), from): ((&Shot, &Vec<[f64; 8]>), &[f64; 8])| Left {
             shot: [shot.flight, shot.segment, shot.start],
             output: std::array::from_fn(|k| square(r, k)),
@@ -286,7 +286,7 @@ impl Search<'_> {
     }
 
     fn residual_sd(&self) -> [f64; 8] {
-        let residuals = self.residuals();
+        let residuals = &self.residuals;
         let count = residuals.iter().map(Vec::len).sum::<usize>() as f64;
         let square = |k: usize| residuals.iter().flatten().map(|r| r[k] * r[k]).sum::<f64>();
         std::array::from_fn(|k| (square(k) / count).sqrt())

@@ -55,11 +55,12 @@ impl Search<'_> {
         (0..count).chain(own..own + size).collect()
     }
 
+    /// The normal equations at the present estimates, with the derivatives that were computed last.
     pub(super) fn system(&self) -> System {
-        let residuals = self.residuals();
         let one = |index: usize| {
+            let (derivatives, residuals) = (&self.derivatives[index], &self.residuals[index]);
             let (shot, from) = (&self.shots[index], &self.place.starts[index]);
-            normal::normal(&self.jacobians[index], &residuals[index], shot, from, &self.weights)
+            normal::normal(derivatives, residuals, shot, from, &self.weights)
         };
         let shots: Vec<Normal> = (0..self.shots.len()).into_par_iter().map(one).collect();
         let prior = self.prior();
@@ -80,13 +81,14 @@ impl Search<'_> {
     /// Takes one damped step that decreases the cost. Up to eight increasing values of the damping are tried. Returns false if
     /// the cost decreases with none of them.
     pub(super) fn step(&mut self, system: &System, damping: &mut f64) -> Result<bool, AmendError> {
-        let before = self.cost(&self.place);
+        let before = self.cost(&self.place, &self.residuals);
         for _ in 0..8 {
             let step = self.solve(system, *damping)?;
             let next = self.moved(system, &step);
-            if self.cost(&next) < before {
+            let residuals = self.residuals_at(&next);
+            if self.cost(&next, &residuals) < before {
                 self.change = self.in_deviations(system, &step);
-                self.place = next;
+                (self.place, self.residuals) = (next, residuals);
                 *damping = (*damping / 10.0).max(1e-9);
                 return Ok(true);
             }
@@ -164,7 +166,7 @@ impl Search<'_> {
     }
 
     /// The largest change of any coefficient, in standard deviations of its estimate, and the index of this coefficient.
-    fn in_deviations(&self, system: &System, step: &DVector<f64>) -> (f64, usize) {
+    pub(super) fn in_deviations(&self, system: &System, step: &DVector<f64>) -> (f64, usize) {
         let Some(cholesky) = system.information.clone().cholesky() else {
             return (f64::INFINITY, 0);
         };

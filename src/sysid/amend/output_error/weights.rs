@@ -1,11 +1,9 @@
-//! Weights and starting point of the output-error fit.
+//! Weights of the output-error fit.
 //!
 //! The fit simulates shots: short stretches of the flights, each from its own initial state. The residuals of a shot are the
 //! differences between the recorded and the simulated states. States and shots have separate weights.
 
 use super::Search;
-use crate::amend::normal::Place;
-use crate::amend::shooting;
 use greylag_num::statistics::{correlation_length, quantile};
 
 /// Smallest standard deviations of residuals, in the units of the state. They cover errors that are present without noise, due
@@ -22,12 +20,12 @@ impl Search<'_> {
     /// drifts has a longer correlation length and therefore a lower weight. It then drifts more, until the fit ignores this
     /// state.
     pub(super) fn reweigh(&mut self) {
-        let residuals = self.residuals();
+        let residuals = &self.residuals;
         let square = |r: &[[f64; 8]], k: usize| r.iter().map(|x| x[k] * x[k]).sum::<f64>();
-        let together = common_length(&residuals);
+        let together = common_length(residuals);
         for (k, floor) in FLOOR.iter().enumerate() {
             let (mut sum, mut count) = (0.0, 0.0);
-            for (shot, r) in self.shots.iter().zip(&residuals) {
+            for (shot, r) in self.shots.iter().zip(residuals) {
                 sum += shot.weight * square(r, k);
                 count += shot.weight * r.len() as f64;
             }
@@ -43,26 +41,6 @@ impl Search<'_> {
         for (shot, mean) in self.shots.iter_mut().zip(means) {
             shot.weight = (usual / mean).min(1.0);
         }
-    }
-
-    /// Chooses the starting point: the equation-error estimate or `given`, the coefficients of the model file. The choice is the
-    /// one with the smaller residuals in shots of `length_s` (s). A kink of a table or a delayed sensor can bias the
-    /// equation-error estimate.
-    pub(super) fn start_from_the_closer(&mut self, given: &[f64], length_s: f64) {
-        self.shots = shooting::cut(self.flights, length_s);
-        self.place.starts = vec![[0.0; 8]; self.shots.len()];
-        let other = Place { theta: given.to_vec(), ..self.place.clone() };
-        if self.distance(&other) < self.distance(&self.place) {
-            self.place.theta = other.theta;
-        }
-    }
-
-    /// Sum over the shots of the root of their weighted mean square residual. A single diverged shot does not dominate this sum.
-    fn distance(&self, place: &Place) -> f64 {
-        let square =
-            |r: &[f64; 8]| (0..8).map(|k| self.weights.output[k] * r[k] * r[k]).sum::<f64>();
-        let root = |r: &Vec<[f64; 8]>| (r.iter().map(square).sum::<f64>() / r.len() as f64).sqrt();
-        self.residuals_at(place).iter().map(root).sum()
     }
 }
 

@@ -46,9 +46,11 @@ pub struct Clocks {
 /// `per_flight` selects.
 ///
 /// The first `given` coefficients have their prior standard deviations. The other linear coefficients have no prior.
-/// `None` if the model cannot be evaluated over the flights.
+/// `near` is an estimate close to the result, from which a single fit suffices. `None` if the model cannot be evaluated over the
+/// flights.
 pub fn clocks(
     model: &GreyBox,
+    near: Option<&GreyBox>,
     given: usize,
     flights: &[(&Prepared, &Doubt)],
     per_flight: PerFlight,
@@ -61,8 +63,9 @@ pub fn clocks(
         per_flight,
         seed: SEED,
     };
-    let mut round = Round::new(&problem, model.clone(), &[])?;
-    for _ in 1..PASSES {
+    let passes = if near.is_some() { 1 } else { PASSES };
+    let mut round = Round::new(&problem, near.unwrap_or(model).clone(), &[])?;
+    for _ in 1..passes {
         round = Round::new(&problem, round.tuned(), &[])?;
     }
     let p = &round.projected;

@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 
 use super::{Found, Problem};
-use crate::flight_path::band::{self, Link, Node, add_gram};
+use crate::flight_path::band::{self, Link, Node, add_gram, add_upper_gram};
 use crate::flight_path::intake::Track;
 use crate::flight_path::kinematics::{Drive, MOTION, Step, gust_kept};
 use crate::flight_path::levels::Levels;
@@ -160,7 +160,7 @@ pub fn weigh<const N: usize, const W: usize, const D: usize>(
     }
     let Some(corner) = corner else { return link };
     let mut own = [[0.0; D]; D];
-    add_gram(&mut own, &step.rest, &step.rest);
+    add_upper_gram(&mut own, &step.rest);
     for (row, own) in corner[W - D..].iter_mut().zip(&own) {
         row[W - D..].iter_mut().zip(own).for_each(|(x, y)| *x += y);
     }

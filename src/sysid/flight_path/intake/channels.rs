@@ -21,9 +21,11 @@ pub(super) struct Channels {
 
 impl Channels {
     pub(super) fn of(flight: &Flight) -> Channels {
-        let channel = |kind, get: &dyn Fn(&Sample) -> f64| {
+        let all = |kind, get: &dyn Fn(&Sample) -> f64| {
             Channel::new(flight.samples.iter().map(|s| (s.time_s, get(s))), kind)
         };
+        let first = all(Interpolation::Linear, &|s| s.rates_radps[0]);
+        let channel = |kind, get: &dyn Fn(&Sample) -> f64| all(kind, get).sharing(&first);
         let three = |kind, get: &dyn Fn(&Sample, usize) -> f64| {
             std::array::from_fn(|i| channel(kind, &|s| get(s, i)))
         };

@@ -27,7 +27,8 @@ pub(super) fn track(
     let near = 0.5 * step;
     let measured = |c: &Channel, t: f64| c.measured(t, reach, near);
     let keep = |use_it: bool, x: f64| if use_it { x } else { nan };
-    let mut track = Track { start, ..Track::default() };
+    let mut track = with_room(n);
+    track.start = start;
     for &t in &times {
         track.rates.push(std::array::from_fn(|i| channels.rates[i].between(t, 2.0 * reach)));
         let force = std::array::from_fn(|i| channels.force[i].between(t, 2.0 * reach));
@@ -65,6 +66,21 @@ pub(super) fn track(
         .collect();
     track.controls = controls(channels, &times, options);
     track
+}
+
+/// An empty track with memory for exactly `n` samples. Lists that grow would take up to twice the memory.
+fn with_room(n: usize) -> Track {
+    Track {
+        rates: Vec::with_capacity(n),
+        force: Vec::with_capacity(n),
+        attitude: Vec::with_capacity(n),
+        airspeed: Vec::with_capacity(n),
+        vanes: Vec::with_capacity(n),
+        velocity: Vec::with_capacity(n),
+        altitude: Vec::with_capacity(n),
+        commands: Vec::with_capacity(n),
+        ..Track::default()
+    }
 }
 
 /// Computes the vertical velocity (m/s, down) from the altitude once every [`CLIMB_WINDOW`]. The intervals do not overlap, so
