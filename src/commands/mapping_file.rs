@@ -37,11 +37,14 @@ mod tests {
     #[test]
     fn a_wrong_unit_is_corrected_in_all_columns_that_have_it() {
         let mut table = String::from(
-            "time_s,roll_rad,pitch_rad,p_radps,q_radps,r_radps,airspeed_mps,aileron_rad,elevator_rad,ax_mps2,ay_mps2,az_mps2\n",
+            "time_s,roll_rad,pitch_rad,p_radps,q_radps,r_radps,airspeed_mps,aileron_rad,elevator_rad,throttle,ax_mps2,ay_mps2,az_mps2\n",
         );
         for k in 0..60 {
-            let _ =
-                writeln!(table, "{:.2},0.1,0.05,0.01,0,0,15,0,0,0.05,0,-1", 0.01 * f64::from(k));
+            let _ = writeln!(
+                table,
+                "{:.2},0.1,0.05,0.01,0,0,15,0,0,0.5,0.05,0,-1",
+                0.01 * f64::from(k)
+            );
         }
         let log = parse(table.as_bytes(), Path::new("g.csv"), &Options::default()).unwrap();
         let cure = Cure { column: "ax_mps2".into(), scale: 9.80665 };
