@@ -10,7 +10,7 @@
 //! The clock of a vehicle starts at zero at each boot. The log of each boot of each vehicle is a flight of its own, because its
 //! times cannot be compared with those of another boot.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
 use std::ops::Range;
 
@@ -35,6 +35,10 @@ const BACK_S: f64 = 5.0;
 const VEHICLE: usize = 50;
 /// Number of successive messages that show a restart. A single message may be late or wrong.
 const BACK_FOR: usize = 5;
+
+/// Index of the field `autopilot` among the values of a HEARTBEAT, and its value (MAV_AUTOPILOT) for PX4.
+const AUTOPILOT: usize = 1;
+const PX4: f64 = 12.0;
 
 /// A message whose time is not yet computed.
 struct Entry {
@@ -68,6 +72,10 @@ struct Reader {
     /// Clock of each sender, by system × 256 + component.
     clocks: BTreeMap<u16, Vec<Tick>>,
     records: usize,
+    /// Parameters as PX4 encodes them, each with the system that sent it.
+    bytewise: BTreeMap<String, (u8, f64)>,
+    /// Systems whose autopilot is PX4.
+    px4: BTreeSet<u8>,
     out: Topics,
     others: BTreeMap<u32, usize>,
 }
@@ -123,12 +131,16 @@ impl Reader {
                 *self.others.entry(frame.id).or_default() += 1;
                 return;
             }
-            Some(Logged::Parameter { name, value }) => {
-                self.out.parameters.insert(name, value);
+            Some(Logged::Parameter { name, value, bytewise }) => {
+                self.out.parameters.insert(name.clone(), value);
+                self.bytewise.insert(name, (frame.source.system, bytewise));
                 return;
             }
             Some(Logged::Values(values)) => values,
         };
+        if values.topic == "HEARTBEAT" && values.values[AUTOPILOT] == PX4 {
+            self.px4.insert(frame.source.system);
+        }
         let stream = self.streams.entry((frame.id, source)).or_insert_with(|| {
             let fields = values.fields.iter().copied();
             let topic = wanted(values.topic).then(|| Topic::new(fields, Keep::All));
@@ -165,6 +177,11 @@ impl Reader {
         }
         for (id, count) in &self.others {
             *self.out.counts.entry((format!("message {id}"), 0)).or_default() += count;
+        }
+        for (name, (system, value)) in std::mem::take(&mut self.bytewise) {
+            if self.px4.contains(&system) {
+                self.out.parameters.insert(name, value);
+            }
         }
         self.out.naming = Naming::Sender;
         if skipped > 0 {
@@ -321,5 +338,39 @@ fn interpolate(clock: &[Tick], host: f64, after: usize) -> Option<f64> {
         (_, Some(b)) => Some(b.own_s),
         (Some(a), None) => Some(a.own_s + (host - a.host_s)),
         (None, None) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A record with a MAVLink 2 frame of the system 1. `extra` is the message's CRC_EXTRA.
+    fn record(id: u8, extra: u8, payload: &[u8]) -> Vec<u8> {
+        let mut frame = vec![0xFD, payload.len() as u8, 0, 0, 0, 1, 1, id, 0, 0];
+        frame.extend(payload);
+        let sum = frame[1..].iter().chain(&[extra]).fold(0xFFFF_u16, |sum, byte| {
+            let x = byte ^ sum as u8;
+            let x = u16::from(x ^ (x << 4));
+            (sum >> 8) ^ (x << 8) ^ (x << 3) ^ (x >> 4)
+        });
+        frame.extend(sum.to_le_bytes());
+        [&1_760_000_000_000_000_u64.to_be_bytes()[..], &frame].concat()
+    }
+
+    #[test]
+    fn an_integer_of_px4_is_read_from_its_bytes() {
+        let heartbeat = |autopilot: u8| record(0, 50, &[0, 0, 0, 0, 1, autopilot, 0, 0, 3]);
+        // SYS_AUTOSTART = 2106 as INT32, the type 6
+        let mut payload = 2106_i32.to_le_bytes().to_vec();
+        payload.extend([1, 0, 0, 0]);
+        payload.extend(b"SYS_AUTOSTART\0\0\0");
+        payload.push(6);
+        let parameter = record(22, 220, &payload);
+        for (autopilot, expected) in [(12, 2106.0), (3, f64::from(f32::from_bits(2106)))] {
+            let log = [heartbeat(autopilot), parameter.clone()].concat();
+            let (flights, _) = read(&mut log.as_slice(), &|_| true);
+            assert_eq!(flights[0].parameters["SYS_AUTOSTART"], expected);
+        }
     }
 }

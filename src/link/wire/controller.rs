@@ -162,18 +162,25 @@ pub fn read(frame: &Frame<'_>) -> Option<ControllerMessage> {
     measured(decode(frame)?)
 }
 
+/// Value of a parameter whose four bytes PX4 sends as a float, `value`. `kind` is its MAV_PARAM_TYPE: 1 UINT8 to 6 INT32, else
+/// a float.
+pub(super) fn bytewise(value: f32, kind: u8) -> f64 {
+    let bits = value.to_bits();
+    match kind {
+        1 => f64::from(bits as u8),
+        2 => f64::from(bits as i8),
+        3 => f64::from(bits as u16),
+        4 => f64::from(bits as i16),
+        5 => f64::from(bits),
+        6 => f64::from(bits as i32),
+        _ => f64::from(value),
+    }
+}
+
 fn parameter(fields: Fields<'_>) -> ControllerMessage {
     let name: Vec<u8> = fields.bytes::<16>(8).into_iter().take_while(|b| *b != 0).collect();
     let cast = f64::from(fields.f32(0));
-    let bytewise = match fields.u8(24) {
-        1 => f64::from(fields.u8(0)),
-        2 => f64::from(fields.u8(0) as i8),
-        3 => f64::from(fields.u16(0)),
-        4 => f64::from(fields.u16(0) as i16),
-        5 => f64::from(fields.u32(0)),
-        6 => f64::from(fields.i32(0)),
-        _ => cast,
-    };
+    let bytewise = bytewise(fields.f32(0), fields.u8(24));
     ControllerMessage::Parameter {
         name: String::from_utf8_lossy(&name).into_owned(),
         cast,

@@ -3,6 +3,7 @@
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{self as messages, MavMessage};
 
+use super::controller::bytewise;
 use super::{Frame, decode};
 
 /// Timestamp that a message contains.
@@ -38,8 +39,10 @@ pub enum Logged {
     Parameter {
         /// Name of the parameter.
         name: String,
-        /// Value of the parameter.
+        /// Value of the parameter, unless the sender is PX4.
         value: f64,
+        /// Value of a parameter of PX4, which sends the bytes of an integer in place of a float.
+        bytewise: f64,
     },
 }
 
@@ -113,7 +116,8 @@ fn logged(message: MavMessage) -> Option<Logged> {
     Some(Logged::Values(match message {
         MavMessage::PARAM_VALUE(m) => {
             let name = m.param_id.to_str().unwrap_or_default().to_owned();
-            return Some(Logged::Parameter { name, value: f64::from(m.param_value) });
+            let bytewise = bytewise(m.param_value, m.param_type as u8);
+            return Some(Logged::Parameter { name, value: f64::from(m.param_value), bytewise });
         }
         MavMessage::HEARTBEAT(m) => values(
             "HEARTBEAT",

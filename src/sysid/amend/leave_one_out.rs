@@ -75,8 +75,7 @@ pub struct Scored {
 /// Leaves out each of `flights` in turn and computes the error of each of `structures` of `model` on this flight. Baselines
 /// (forecasts without aerodynamics) follow in the result and are never chosen.
 ///
-/// All flights are fitted once for each structure. The fits without a flight start from there and are nearly those from the
-/// beginning, see `output_error::without_each`.
+/// The fits without a flight start from one fit to all flights (`output_error::without_each`), those from scratch do not.
 ///
 /// The chosen structure has the fewest free coefficients among all whose mean error exceeds that of the best structure by no
 /// more than one standard error of the difference, flight by flight, or by 1 % (the rule of Breiman et al., Classification and
@@ -237,7 +236,11 @@ fn fit(
             (with(model, effects)?, options)
         }
     };
-    let fits = output_error::without_each(&start, flights, &options, set.judges);
+    let without = match fitted {
+        Fitted::FromScratch => output_error::without_each_anew,
+        _ => output_error::without_each,
+    };
+    let fits = without(&start, flights, &options, set.judges);
     let mut models = Vec::with_capacity(fits.len());
     for fit in fits {
         match fit {

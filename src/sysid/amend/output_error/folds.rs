@@ -17,25 +17,18 @@ use greylag_model::GreyBox;
 ///
 /// All flights are fitted once. A fit without a flight starts from this fit: from its estimates, from its division into shots,
 /// and from the derivatives of the other flights. The first step needs no simulation, because it solves the normal equations of
-/// the other flights. Steps with the same derivatives follow until they are small. All weights, errors of initial states,
-/// constants of flights and expected delays of actuators are estimated again without the flight. If a coefficient has changed
-/// by more than one standard deviation then, the search continues with new derivatives, as in every other fit.
+/// the other flights. All weights, errors of initial states, constants of flights and expected delays of actuators are
+/// estimated again without the flight, and the search converges with new derivatives, as every other fit.
 ///
-/// The result is approximate in two ways. Without new derivatives, it differs by less than a tenth of a standard deviation, the
-/// tolerance of a fit, from a fit from the beginning. The parts of flights that are left out because simulations diverge there
-/// are those of the fit to all flights. The flight has no other influence. If the fit to all flights or the one without a
-/// flight fails, the latter is made from the beginning.
+/// The flight has influence in two ways. The search ends in the minimum that is the nearest to the fit to all flights. The
+/// parts of flights that are left out because simulations diverge there are those of the fit to all flights. If the fit to all
+/// flights or the one without a flight fails, the latter is made from the beginning.
 pub fn without_each(
     model: &GreyBox,
     flights: &[Flight],
     options: &FitOptions,
     left: &[usize],
 ) -> Vec<Result<Fit, AmendError>> {
-    let anew = |left: usize| {
-        let others = flights.iter().enumerate().filter(|(k, _)| *k != left);
-        let others: Vec<Flight> = others.map(|(_, flight)| flight.clone()).collect();
-        fit(model, &others, options, &ignore_progress)
-    };
     let start = Start::of(model, flights, options, &ignore_progress);
     let whole = start.as_ref().ok().and_then(|start| {
         let search = start.searched(flights, options, &ignore_progress).ok()?;
@@ -44,11 +37,34 @@ pub fn without_each(
     let one = |left: &usize| match &whole {
         Some((start, whole)) => {
             let fold = whole.without(*left).refitted(model, start, options);
-            fold.or_else(|_| anew(*left))
+            fold.or_else(|_| without(model, flights, options, *left))
         }
-        None => anew(*left),
+        None => without(model, flights, options, *left),
     };
     left.par_iter().map(one).collect()
+}
+
+/// Does the same as [`without_each`], but makes each fit from the beginning. Coefficients without a prior can have several
+/// minima. The nearest one to the fit to all flights would then know the flight that is left out.
+pub fn without_each_anew(
+    model: &GreyBox,
+    flights: &[Flight],
+    options: &FitOptions,
+    left: &[usize],
+) -> Vec<Result<Fit, AmendError>> {
+    left.par_iter().map(|left| without(model, flights, options, *left)).collect()
+}
+
+/// Fits `model` to `flights` without the one with the index `left`, from the beginning.
+fn without(
+    model: &GreyBox,
+    flights: &[Flight],
+    options: &FitOptions,
+    left: usize,
+) -> Result<Fit, AmendError> {
+    let others = flights.iter().enumerate().filter(|(k, _)| *k != left);
+    let others: Vec<Flight> = others.map(|(_, flight)| flight.clone()).collect();
+    fit(model, &others, options, &ignore_progress)
 }
 
 impl<'a> Search<'a> {
@@ -102,12 +118,9 @@ impl<'a> Search<'a> {
             self.expect_delays(&late.unwrap_or_default());
         }
         self.reweigh();
-        let (from, mut damping) = (self.place.theta.clone(), DAMPING);
-        self.approach(0, &mut damping, &|| Ok(()))?;
-        if !self.derivatives_hold(&from) {
-            // the derivatives of the fit to all flights count as the first ones
-            self.settle(1..options.renewals, RENEWED, &|_| Ok(()))?;
-        }
+        self.approach(0, &mut { DAMPING }, &|| Ok(()))?;
+        // the derivatives of the fit to all flights count as the first ones
+        self.settle(1..options.renewals, RENEWED, &|_| Ok(()))?;
         self.completed(given, options, &ignore_progress)
     }
 }
@@ -178,9 +191,7 @@ mod tests {
         let options = FitOptions::default();
         let all = without_each(&model, &flights, &options, &[0, 1, 2, 3]);
         for (left, found) in all.into_iter().enumerate() {
-            let others = flights.iter().enumerate().filter(|(k, _)| *k != left);
-            let others: Vec<Flight> = others.map(|(_, flight)| flight.clone()).collect();
-            let exact = fit(&model, &others, &options, &ignore_progress).unwrap();
+            let exact = without(&model, &flights, &options, left).unwrap();
             let judge = Judge { test: &flights[left..=left], horizons_s: &[2.0] };
             let error = |fit: &Fit| judged(&judge.scores(&fit.model)).unwrap();
             let (found, exact) = (error(&found.unwrap()), error(&exact));
