@@ -15,7 +15,6 @@ mod weights;
 use std::ops::Range;
 use std::sync::Arc;
 
-use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::derivatives::{Derivatives, Neighbourhood, derivatives};
@@ -41,10 +40,6 @@ const STEP_TOLERANCE: f64 = 0.03;
 const RENEWED: f64 = 0.1;
 /// Replaces `RENEWED` for all shot lengths except the last.
 const NEAR: f64 = 5.0;
-/// Derivatives count as accurate up to this change of any coefficient, in standard deviations. The simulated states then change
-/// by no more than their noise, and the derivatives by a few percent. An estimate with such derivatives differs by less than
-/// `RENEWED` from one with new derivatives.
-const VALID: f64 = 1.0;
 /// Largest number of steps with the same derivatives.
 const INNER: usize = 6;
 /// Damping at the start of a search.
@@ -199,8 +194,8 @@ impl<'a> Search<'a> {
     /// Iterates estimates and weights to convergence.
     ///
     /// The derivatives are the most expensive part. They are recomputed only after the search has converged with the old
-    /// derivatives. The search ends if this has changed no coefficient by more than [`VALID`] standard deviations, or if a step
-    /// with new derivatives changes no coefficient by more than `tolerance` standard deviations.
+    /// derivatives. The search ends if a step with new derivatives changes no coefficient by more than `tolerance` standard
+    /// deviations.
     ///
     /// `renewals` are the numbers of the computations of the derivatives; number 0 is the first one of a search with these shots.
     /// `step` receives the fraction of them that is done.
@@ -215,9 +210,8 @@ impl<'a> Search<'a> {
             let done = renewal as f64 / end as f64;
             step(done)?;
             self.differentiate();
-            let from = self.place.theta.clone();
             let first = self.approach(renewal, &mut damping, &|| step(done))?;
-            if (renewal > 0 && first < tolerance) || self.derivatives_hold(&from) {
+            if renewal > 0 && first < tolerance {
                 break;
             }
         }
@@ -250,17 +244,6 @@ impl<'a> Search<'a> {
             }
         }
         Ok(first)
-    }
-
-    /// Whether the derivatives, which were computed at the coefficients `from`, are still accurate enough at the present ones, to
-    /// which the steps have converged.
-    fn derivatives_hold(&self, from: &[f64]) -> bool {
-        if self.stuck || self.change.0.is_nan() || self.change.0 >= STEP_TOLERANCE {
-            return false;
-        }
-        let changes = self.place.theta.iter().zip(from).map(|(x, from)| x - from);
-        let changes = DVector::from_iterator(from.len(), changes);
-        self.in_deviations(&self.system(), &changes).0 <= VALID
     }
 
     /// Computes the derivatives at the present estimates.
