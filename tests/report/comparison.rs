@@ -62,7 +62,8 @@ fn the_leading_sentence_is_first_and_leads_to_its_channel() {
         _ => None,
     });
     let found = found.unwrap();
-    assert_eq!(found.lead[0].sentence, comparison.sentences[0]);
+    // every sentence names its model, and those of the last model come first
+    assert_eq!(found.lead[0].sentence, format!("amended: {}", comparison.models[1].sentences[0]));
     let link = found.lead[1].link.as_ref().expect("the sentence on lift has a figure");
     assert_eq!(link.option, "L lift");
     let html = page.render();
@@ -70,9 +71,12 @@ fn the_leading_sentence_is_first_and_leads_to_its_channel() {
     assert!(html.contains(&anchor), "the link leads nowhere");
     assert!(html.contains("<div class=\"option\" data-option=\"L lift\">"));
     assert!(
-        found.rest.iter().any(|f| f.sentence.starts_with("amended: ")),
-        "the second model has its say"
+        found.rest.iter().any(|f| f.sentence.starts_with("prior-as-printed: ")),
+        "the first model has its say"
     );
+    let names = ["amended: ", "prior-as-printed: "];
+    let all = || found.lead.iter().chain(&found.rest);
+    assert!(all().all(|f| names.iter().any(|name| f.sentence.starts_with(name))));
 }
 
 #[test]

@@ -11,9 +11,9 @@ use crate::{
 use greylag_sysid::compare::answer::Way;
 use greylag_sysid::compare::{ChannelId, Comparison, GrowthPoint, ModelResult};
 
-/// Number of sentences on the first model that are shown prominently.
+/// Number of sentences on the last model that are shown prominently.
 const LEADING: usize = 2;
-/// Largest number of sentences on each further model.
+/// Largest number of sentences on each model before the last.
 const OF_OTHERS: usize = 2;
 
 /// The page of `report`: first the answer, then the evidence for it.
@@ -90,29 +90,36 @@ pub(crate) fn channel_name(id: ChannelId) -> String {
     format!("{} {}", id.symbol(), id.name())
 }
 
-/// The sentences on all models, the worst channels first. The first `leading` on the first model are prominent.
+/// The sentences on all models, the worst channels first. The last model comes first, with the first `leading` of its sentences
+/// prominent. With several models, each sentence begins with the name of its model.
 fn findings(c: &Comparison, leading: usize) -> Findings {
-    let mut lead = Vec::new();
-    let mut rest = Vec::new();
-    for (k, model) in c.models.iter().enumerate() {
-        let own = if k == 0 { usize::MAX } else { OF_OTHERS };
+    let mut found = Findings::default();
+    let last = c.models.len().saturating_sub(1);
+    for (k, model) in c.models.iter().enumerate().rev() {
+        let own = if k == last { usize::MAX } else { OF_OTHERS };
         for (i, said) in model.sentences_worst_first().into_iter().take(own).enumerate() {
-            let finding = Finding { sentence: said.into(), link: link(model, said) };
-            match (k, i < leading) {
-                (0, true) => lead.push(finding),
-                (0, false) => rest.push(finding),
-                _ => rest.push(Finding {
-                    sentence: format!("{}: {}", model.name, finding.sentence),
-                    ..finding
-                }),
-            }
+            let sentence = match last {
+                0 => said.into(),
+                _ => format!("{}: {said}", named(c, k)),
+            };
+            let finding = Finding { sentence, link: link(model, said) };
+            let prominent = k == last && i < leading;
+            let list = if prominent { &mut found.lead } else { &mut found.rest };
+            list.push(finding);
         }
     }
-    if lead.is_empty() && rest.is_empty() {
+    if found.lead.is_empty() && found.rest.is_empty() {
         let sentence = "No channel could be compared: the notes say why.".into();
-        lead.push(Finding { sentence, link: None });
+        found.lead.push(Finding { sentence, link: None });
     }
-    Findings { lead, rest, ..Findings::default() }
+    found
+}
+
+/// The name of the model with index `k`, marked as given if the last model was made from it.
+fn named(c: &Comparison, k: usize) -> String {
+    let made = c.answer.numbers.steps.iter().any(|s| matches!(s.way, Way::Tuned | Way::Effects));
+    let given = if k == 0 && made { " (as given)" } else { "" };
+    format!("{}{given}", c.models[k].name)
 }
 
 /// Link to the regimes of the channel whose worst regime `sentence` describes.

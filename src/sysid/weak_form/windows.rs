@@ -149,12 +149,12 @@ struct Load {
 impl Load {
     fn at(model: &GreyBox, at: &Instant) -> Load {
         let air = model.air(&at.state, at.altitude);
-        let wrench = model.wrench(&at.state, &at.controls, &air);
+        let [force, moment] = predicted(model, &at.state, &at.controls, &air);
         Load {
             measured_force: measured_force(model, at, &air),
-            force: predicted_force(model, &wrench, &air),
+            force,
             turning: gyroscopic(&model.body, &at.state),
-            moment: moments(&wrench),
+            moment,
         }
     }
 }
@@ -207,6 +207,27 @@ fn measured_force(model: &GreyBox, at: &Instant, air: &AirData) -> Vector<f64> {
     to_force_axes(force, air, model.axes)
 }
 
+/// Predicted D (less thrust), L and Y, N, and moment, N m. The learned residual of `model` adds the force and the moment that
+/// change the rates of the state as it does.
+fn predicted(
+    model: &GreyBox,
+    state: &State,
+    controls: &Controls,
+    air: &AirData,
+) -> [Vector<f64>; 2] {
+    let wrench = model.wrench(state, controls, air);
+    let (mut force, mut moment) = (predicted_force(model, &wrench, air), moments(&wrench));
+    if let Some(residual) = &model.residual {
+        let rate = residual.rate(state, controls);
+        let pull = rigid_body::acceleration_of(state, air, &rate).map(|a| a * model.body.mass);
+        let pull = to_force_axes(pull, air, model.axes);
+        let turn = inertia(&model.body, [rate.p, rate.q, rate.r]);
+        force = std::array::from_fn(|k| force[k] + pull[k]);
+        moment = std::array::from_fn(|k| moment[k] + turn[k]);
+    }
+    [force, moment]
+}
+
 pub(super) fn predicted_force(model: &GreyBox, wrench: &Wrench, air: &AirData) -> Vector<f64> {
     to_force_axes(rigid_body::body_force(wrench, air, model.axes), air, model.axes)
 }
@@ -255,7 +276,7 @@ pub(crate) fn gyroscopic<R: Real>(body: &RigidBody, state: &State<R>) -> Vector<
 fn moment(model: &GreyBox, samples: &[Instant], k: usize) -> Vector<f64> {
     let end = &samples[k + 1];
     let air = model.air(&end.state, end.altitude);
-    moments(&model.wrench(&end.state, &samples[k].controls, &air))
+    predicted(model, &end.state, &samples[k].controls, &air)[1]
 }
 
 fn moments(wrench: &Wrench) -> Vector<f64> {
