@@ -130,7 +130,7 @@ pub struct Numbers {
     pub baseline: Option<Baseline>,
     /// Effects that the last model has and the first model lacks.
     pub effects: Vec<Decisive>,
-    /// The state whose prediction improves most; `None` if no prediction improves.
+    /// The state whose prediction shows the improvement best; `None` if no prediction improves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub in_use: Option<InUse>,
     /// The state with the largest remaining error, under the first model if tuning it is in vain. `None` if no horizon is
@@ -264,15 +264,19 @@ fn in_use(before: &HorizonScore, after: &HorizonScore, effects: &[Decisive]) -> 
 /// States that the channels of `effects` change directly, according to the catalogue. Empty for effects on the deflections.
 fn states_of(effects: &[Decisive]) -> Vec<&'static str> {
     let entries = effects.iter().filter_map(|e| describe(&e.id)?.entry);
-    let of = |channel: &Channel| match channel {
-        Channel::Drag | Channel::BodyX => ["airspeed_mps"].as_slice(),
+    entries.flat_map(|entry| entry.channels.iter().flat_map(changed_by).copied()).collect()
+}
+
+/// States that a force or moment in `channel` changes directly.
+fn changed_by(channel: &Channel) -> &'static [&'static str] {
+    match channel {
+        Channel::Drag | Channel::BodyX => &["airspeed_mps"],
         Channel::Lift => &["alpha_rad"],
         Channel::Side => &["beta_rad"],
         Channel::Roll => &["roll_rad"],
         Channel::Pitch => &["pitch_rad", "alpha_rad"],
         Channel::Yaw => &["beta_rad", "r_radps"],
-    };
-    entries.flat_map(|entry| entry.channels.iter().flat_map(of).copied()).collect()
+    }
 }
 
 fn left(last: &HorizonScore) -> Option<Left> {
