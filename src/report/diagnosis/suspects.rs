@@ -119,7 +119,10 @@ pub(crate) fn curves(d: &Diagnosis) -> Section {
     let options: Vec<ChoiceOption> = shown.iter().map(option).collect();
     let found: Vec<&str> = d.effects.iter().filter(|c| c.asserted).map(|c| c.id.as_str()).collect();
     let mut beside = match (found.len(), options.len()) {
-        (0, _) => " An interval without zero proves no suspect: its evidence must exceed chance as well.".into(),
+        (0, _) => {
+            " An interval without zero proves no suspect: its evidence must exceed chance as well."
+                .into()
+        }
         (some, all) if some < all => {
             format!(" Missing: {}; the others are no more than suspects.", found.join(", "))
         }

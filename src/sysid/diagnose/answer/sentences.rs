@@ -224,12 +224,7 @@ pub fn figures(x: f64) -> String {
 
 /// Notes on coefficients and sensor errors far from their prior values, on what a flexible model could remove, on constants
 /// of single flights, and on effects that were left out of the search.
-pub fn notes(
-    found: &Found,
-    model: &GreyBox,
-    verdict: Verdict,
-    options: &Options,
-) -> Vec<String> {
+pub fn notes(found: &Found, model: &GreyBox, verdict: Verdict, options: &Options) -> Vec<String> {
     let mut notes = Vec::new();
     for t in shares::tuned(found, model) {
         let off = (t.value - t.prior).abs() / t.prior_sd;
@@ -290,7 +285,9 @@ mod tests {
     fn a_smoothing_of_the_record_does_not_contradict_an_adequate_model() {
         let name = "blur_actuators of flight a.csv";
         let adequate = far_off(name, -10.3, Verdict::Adequate);
-        assert!(adequate.contains("(a smoothing of the recorded deflections) would have to be -10.3"));
+        assert!(
+            adequate.contains("(a smoothing of the recorded deflections) would have to be -10.3")
+        );
         assert!(adequate.ends_with("no missing effect was found that acts like it."), "{adequate}");
         let unexplained = far_off(name, -10.3, Verdict::Unexplained);
         assert!(unexplained.ends_with("acts like it may be missing."), "{unexplained}");
