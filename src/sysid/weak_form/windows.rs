@@ -353,3 +353,34 @@ pub(crate) fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
     let moment: Vector<f64> = std::array::from_fn(|k| load.moment[k] - load.turning[k]);
     std::array::from_fn(|k| [force, moment, [rate.airspeed, rate.alpha, rate.beta]][k / 3][k % 3])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn forces_and_moments_contain_the_learned_residual() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/learned/model.toml");
+        let model = GreyBox::load(&path).unwrap();
+        assert!(model.residual.is_some());
+        let state = State::from_array([0.1, 0.1, 18.0, 0.1, 0.1, 0.1, 0.05, 0.02]);
+        let (aileron, elevator) = (0.05, 0.02);
+        let controls = Controls { aileron, elevator, throttle: 0.5, rudder: 0.0, lagged: None };
+        let air = model.air(&state, 100.0);
+        let [[drag, lift, side], moment] = predicted(&model, &state, &controls, &air);
+        let mut wrench = Wrench::zero();
+        let forces = [(Channel::Drag, drag), (Channel::Lift, lift), (Channel::Side, side)];
+        forces.into_iter().for_each(|(channel, force)| wrench.add(channel, force));
+        let force = rigid_body::body_force(&wrench, &air, model.axes);
+        let gravity = rigid_body::gravity_in_body(&state, model.atmosphere.gravity);
+        let pull = std::array::from_fn(|k| force[k] / model.body.mass + gravity[k]);
+        let spin = rigid_body::angular_acceleration(&model.body, &state, moment);
+        let rate = rigid_body::state_rate(&state, &air, pull, spin).to_array();
+        let whole = model.rate(&state, &controls, 100.0).to_array();
+        // airspeed, body rates, α and β
+        for k in 2..8 {
+            assert!((rate[k] - whole[k]).abs() < 1e-9 * (1.0 + whole[k].abs()), "{rate:?} {whole:?}");
+        }
+    }
+}
