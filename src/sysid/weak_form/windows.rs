@@ -16,7 +16,7 @@ use greylag_logs::Sampling;
 use greylag_model::{GreyBox, Integrator, Memory};
 use greylag_num::Real;
 use greylag_physics::rigid_body::{self, ForceAxes, RigidBody, Vector};
-use greylag_physics::{AirData, Channel, State, Wrench};
+use greylag_physics::{AirData, Channel, Controls, State, Wrench};
 
 /// Approximate number of windows of a flight in which the sensitivity to sensor noise is evaluated.
 const NOISE_WINDOWS: usize = 40;
@@ -374,13 +374,14 @@ mod tests {
         forces.into_iter().for_each(|(channel, force)| wrench.add(channel, force));
         let force = rigid_body::body_force(&wrench, &air, model.axes);
         let gravity = rigid_body::gravity_in_body(&state, model.atmosphere.gravity);
-        let pull = std::array::from_fn(|k| force[k] / model.body.mass + gravity[k]);
+        let pull: Vector<f64> =
+            std::array::from_fn(|k| force[k] / model.body.mass + gravity[k]);
         let spin = rigid_body::angular_acceleration(&model.body, &state, moment);
         let rate = rigid_body::state_rate(&state, &air, pull, spin).to_array();
         let whole = model.rate(&state, &controls, 100.0).to_array();
         // airspeed, body rates, α and β
-        for k in 2..8 {
-            assert!((rate[k] - whole[k]).abs() < 1e-9 * (1.0 + whole[k].abs()), "{rate:?} {whole:?}");
+        for (x, y) in rate.iter().zip(&whole).skip(2) {
+            assert!((x - y).abs() < 1e-9 * (1.0 + y.abs()), "{rate:?} {whole:?}");
         }
     }
 }
