@@ -374,8 +374,7 @@ mod tests {
         forces.into_iter().for_each(|(channel, force)| wrench.add(channel, force));
         let force = rigid_body::body_force(&wrench, &air, model.axes);
         let gravity = rigid_body::gravity_in_body(&state, model.atmosphere.gravity);
-        let pull: Vector<f64> =
-            std::array::from_fn(|k| force[k] / model.body.mass + gravity[k]);
+        let pull: Vector<f64> = std::array::from_fn(|k| force[k] / model.body.mass + gravity[k]);
         let spin = rigid_body::angular_acceleration(&model.body, &state, moment);
         let rate = rigid_body::state_rate(&state, &air, pull, spin).to_array();
         let whole = model.rate(&state, &controls, 100.0).to_array();
