@@ -62,7 +62,8 @@ fn the_leading_sentence_is_first_and_leads_to_its_channel() {
         _ => None,
     });
     let found = found.unwrap();
-    assert_eq!(found.lead[0].sentence, comparison.sentences[0]);
+    // every sentence names its model, and those of the last model come first
+    assert_eq!(found.lead[0].sentence, format!("amended: {}", comparison.models[1].sentences[0]));
     let link = found.lead[1].link.as_ref().expect("the sentence on lift has a figure");
     assert_eq!(link.option, "L lift");
     let html = page.render();
@@ -70,19 +71,38 @@ fn the_leading_sentence_is_first_and_leads_to_its_channel() {
     assert!(html.contains(&anchor), "the link leads nowhere");
     assert!(html.contains("<div class=\"option\" data-option=\"L lift\">"));
     assert!(
-        found.rest.iter().any(|f| f.sentence.starts_with("amended: ")),
-        "the second model has its say"
+        found.rest.iter().any(|f| f.sentence.starts_with("prior-as-printed: ")),
+        "the first model has its say"
     );
+    let names = ["amended: ", "prior-as-printed: "];
+    let all = || found.lead.iter().chain(&found.rest);
+    assert!(all().all(|f| names.iter().any(|name| f.sentence.starts_with(name))));
+}
+
+#[test]
+fn the_curves_of_growth_end_with_most_of_the_runs() {
+    let mut comparison = report_comparison::comparison(60.0);
+    for model in &mut comparison.models {
+        // 38 runs at first; the error of the 7 that are left after 3 s is small
+        for point in model.growth.iter_mut().filter(|p| p.time_s > 3.05) {
+            (point.runs, point.rmse_scaled) = (7, 1e-3);
+        }
+    }
+    let figures = figures(&report(&comparison).page().render());
+    let curve = of_kind(&figures, "curves")[0];
+    let last = curve["x"].as_array().unwrap().last().unwrap().as_f64().unwrap();
+    assert!((last - 3.0).abs() < 1e-6, "the curve ends at {last} s");
 }
 
 #[test]
 fn thin_bins_are_marked_and_set_no_scale() {
     let mut comparison = report_comparison::comparison(60.0);
     // A thin cell that is off by chance, ten times what any other is.
-    let map = &mut comparison.models[0].channels[0].map;
+    // the channels begin with the yawing moment, which the answer box names
+    let map = &mut comparison.models[0].channels[5].map;
     let strongest = |supported: bool| {
         let all = report_comparison::comparison(60.0);
-        let cells = all.models[0].channels[0].map.cells.clone();
+        let cells = all.models[0].channels[5].map.cells.clone();
         cells.iter().filter(|c| c.supported || !supported).map(|c| c.mean.abs()).fold(0.0, f64::max)
     };
     let thin = map.cells.iter_mut().find(|c| !c.supported).expect("the sample has thin cells");

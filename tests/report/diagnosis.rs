@@ -234,6 +234,16 @@ fn the_box_says_where_the_tuned_model_fails() {
     );
     assert!(none.find(&answer.effect) < none.find(&answer.error));
     assert!(none.contains("Nearest suspects, none proven"));
+    assert!(none.contains("Worst regime") && !none.contains("has no curve"));
+
+    // the figures begin with the candidate that the answer calls the nearest, and an empty table is not drawn
+    d.effects[0].curve = None;
+    for channel in &mut d.channels {
+        (channel.worst_regime, channel.left_with) = (None, None);
+    }
+    let none = said(&d);
+    let nearest = format!("{}, the nearest, has no curve", d.effects[0].id);
+    assert!(none.contains(&nearest) && !none.contains("Worst regime"), "{none}");
 }
 
 /// The table of the tuned model states the share that the bars state. The comparison alone has 11 % of lift in its first model.

@@ -11,10 +11,13 @@ use crate::{
 use greylag_sysid::compare::answer::Way;
 use greylag_sysid::compare::{ChannelId, Comparison, GrowthPoint, ModelResult};
 
-/// Number of sentences on the first model that are shown prominently.
+/// Number of sentences on the last model that are shown prominently.
 const LEADING: usize = 2;
-/// Largest number of sentences on each further model.
+/// Largest number of sentences on each model before the last.
 const OF_OTHERS: usize = 2;
+
+/// A curve of the error growth ends where fewer runs than this, or than a fifth of the runs, are long enough.
+const FEW: usize = 5;
 
 /// The page of `report`: first the answer, then the evidence for it.
 pub fn comparison_page(report: &ComparisonReport) -> Page {
@@ -90,29 +93,36 @@ pub(crate) fn channel_name(id: ChannelId) -> String {
     format!("{} {}", id.symbol(), id.name())
 }
 
-/// The sentences on all models, the worst channels first. The first `leading` on the first model are prominent.
+/// The sentences on all models, the worst channels first. The last model comes first, with the first `leading` of its sentences
+/// prominent. With several models, each sentence begins with the name of its model.
 fn findings(c: &Comparison, leading: usize) -> Findings {
-    let mut lead = Vec::new();
-    let mut rest = Vec::new();
-    for (k, model) in c.models.iter().enumerate() {
-        let own = if k == 0 { usize::MAX } else { OF_OTHERS };
+    let mut found = Findings::default();
+    let last = c.models.len().saturating_sub(1);
+    for (k, model) in c.models.iter().enumerate().rev() {
+        let own = if k == last { usize::MAX } else { OF_OTHERS };
         for (i, said) in model.sentences_worst_first().into_iter().take(own).enumerate() {
-            let finding = Finding { sentence: said.into(), link: link(model, said) };
-            match (k, i < leading) {
-                (0, true) => lead.push(finding),
-                (0, false) => rest.push(finding),
-                _ => rest.push(Finding {
-                    sentence: format!("{}: {}", model.name, finding.sentence),
-                    ..finding
-                }),
-            }
+            let sentence = match last {
+                0 => said.into(),
+                _ => format!("{}: {said}", named(c, k)),
+            };
+            let finding = Finding { sentence, link: link(model, said) };
+            let prominent = k == last && i < leading;
+            let list = if prominent { &mut found.lead } else { &mut found.rest };
+            list.push(finding);
         }
     }
-    if lead.is_empty() && rest.is_empty() {
+    if found.lead.is_empty() && found.rest.is_empty() {
         let sentence = "No channel could be compared: the notes say why.".into();
-        lead.push(Finding { sentence, link: None });
+        found.lead.push(Finding { sentence, link: None });
     }
-    Findings { lead, rest, ..Findings::default() }
+    found
+}
+
+/// The name of the model with index `k`, marked as given if the last model was made from it.
+fn named(c: &Comparison, k: usize) -> String {
+    let made = c.answer.numbers.steps.iter().any(|s| matches!(s.way, Way::Tuned | Way::Effects));
+    let given = if k == 0 && made { " (as given)" } else { "" };
+    format!("{}{given}", c.models[k].name)
 }
 
 /// Link to the regimes of the channel whose worst regime `sentence` describes.
@@ -159,18 +169,26 @@ fn growth_note(c: &Comparison) -> String {
     format!(
         "Free runs on the recorded actuators, started from reconstructed states every {} s; each \
          state's error is divided by its characteristic value x_c. A run that has diverged counts \
-         as {}.",
+         as {}. The curves end where fewer than {FEW} runs or a fifth of them are long enough.",
         c.settings.start_every_s, c.settings.divergence_bound
     )
 }
 
+/// The growth of the error of `model` up to the time that enough runs reach. Beyond it, a curve would change because runs end.
+fn well_founded(model: &ModelResult) -> &[GrowthPoint] {
+    let all = model.growth.iter().map(|p| p.runs).max().unwrap_or(0);
+    let least = all.div_ceil(5).max(FEW).min(all);
+    let end = model.growth.iter().position(|p| p.runs < least);
+    &model.growth[..end.unwrap_or(model.growth.len())]
+}
+
 pub(crate) fn growth(c: &Comparison) -> Vec<Figure> {
-    let longest = c.models.iter().map(|m| &m.growth).max_by_key(|g| g.len());
+    let longest = c.models.iter().map(well_founded).max_by_key(|g| g.len());
     let Some(longest) = longest.filter(|g| !g.is_empty()) else { return Vec::new() };
     let curves = |title: &str, value: fn(&GrowthPoint) -> f64| {
         // all models have the same runs, so the curves have the same times up to the end of the shorter one
         let series = c.models.iter().enumerate().map(|(i, m)| {
-            let mut values: Vec<f64> = m.growth.iter().map(value).collect();
+            let mut values: Vec<f64> = well_founded(m).iter().map(value).collect();
             values.resize(longest.len(), f64::NAN);
             Series::new(&m.name, Style::nth(i), values)
         });
@@ -189,7 +207,8 @@ pub(crate) fn growth(c: &Comparison) -> Vec<Figure> {
     ]
 }
 
-/// The alternatives of a choice between channels: one for each channel for which `figures` returns any.
+/// The alternatives of a choice between channels: one for each channel for which `figures` returns any. The channel that the answer
+/// box names comes first, so that the page opens on it.
 pub(crate) fn by_channel(
     c: &Comparison,
     figures: impl Fn(ChannelId) -> Vec<Figure>,
@@ -197,6 +216,9 @@ pub(crate) fn by_channel(
     let seen =
         |id: &ChannelId| c.models.iter().any(|m| m.channels.iter().any(|x| x.channel == *id));
     let option = |id| ChoiceOption { name: channel_name(id), figures: figures(id) };
-    let all = ChannelId::ALL.into_iter().filter(seen).map(option);
+    let named = place::channel_of(c);
+    let mut ids: Vec<ChannelId> = ChannelId::ALL.into_iter().filter(seen).collect();
+    ids.sort_by_key(|id| Some(*id) != named);
+    let all = ids.into_iter().map(option);
     all.filter(|o| !o.figures.is_empty()).collect()
 }

@@ -23,6 +23,22 @@ fn share(model: &ModelResult, id: ChannelId) -> Option<f64> {
     of.map(|ch| ch.unexplained_fraction).filter(|share| share.is_finite())
 }
 
+/// The channel that the sentence of [`of_comparison`] names first; `None` if it names none.
+pub(crate) fn channel_of(c: &Comparison) -> Option<ChannelId> {
+    let effects: Vec<&str> = c.answer.numbers.effects.iter().map(|e| e.id.as_str()).collect();
+    let added = match &c.models[..] {
+        [given, after] if !effects.is_empty() => {
+            reduced(&effects, given, c.tuned.as_ref(), after).and_then(|ids| ids.first().copied())
+        }
+        _ => None,
+    };
+    let worst = |first: &ModelResult| {
+        let channels = first.worst_first();
+        channels.iter().map(|ch| ch.channel).find(|id| share(first, *id).is_some())
+    };
+    added.or_else(|| c.models.first().and_then(worst))
+}
+
 /// Sentence for the page of the comparison `c`. For a model and its amendment with added effects, it states where they act.
 pub(crate) fn of_comparison(c: &Comparison) -> String {
     let effects: Vec<&str> = c.answer.numbers.effects.iter().map(|e| e.id.as_str()).collect();
@@ -33,16 +49,36 @@ pub(crate) fn of_comparison(c: &Comparison) -> String {
     added.unwrap_or_else(|| of_models(&c.models))
 }
 
-/// Sentence on the one or two channels in which the `effects` that were added to `after` reduce the unexplained share most, among
-/// the channels in which they act. For effects that act on deflections, all forces and moments are compared. The share is compared
-/// with that of the tuned model, or with that of the given model if `tuned` is unknown. `None` if there is no effect or no
-/// reduction.
+/// Sentence on the one or two channels of [`reduced`]. `None` if there is no effect or no reduction.
 pub(crate) fn of_added(
     effects: &[&str],
     given: &ModelResult,
     tuned: Option<&ModelResult>,
     after: &ModelResult,
 ) -> Option<String> {
+    let ids = reduced(effects, given, tuned, after)?;
+    let (verb, it) = match effects {
+        [] => return None,
+        [_] => ("acts", "it"),
+        _ => ("act", "them"),
+    };
+    let shares: Vec<String> = ids
+        .iter()
+        .map(|id| format!("{}, {}", id.name(), shares(*id, given, tuned, after, it)))
+        .collect();
+    let next = most_left(after, &ids);
+    Some(format!("Where {} {verb}: {}{next}.", effects.join(" and "), shares.join("; ")))
+}
+
+/// The one or two channels in which the `effects` that were added to `after` reduce the unexplained share most, among the channels
+/// in which they act. For effects that act on deflections, all forces and moments are compared. The share is compared with that of
+/// the tuned model, or with that of the given model if `tuned` is unknown. `None` if no share is reduced.
+fn reduced(
+    effects: &[&str],
+    given: &ModelResult,
+    tuned: Option<&ModelResult>,
+    after: &ModelResult,
+) -> Option<Vec<ChannelId>> {
     let fall = |id: &ChannelId| {
         let fall = share(tuned.unwrap_or(given), *id)? - share(after, *id)?;
         (fall > 0.0).then_some((*id, fall))
@@ -57,18 +93,7 @@ pub(crate) fn of_added(
         (!falls.is_empty()).then(|| falls.into_iter().map(|(id, _)| id).collect::<Vec<_>>())
     };
     let (loads, rates) = ChannelId::ALL.split_at(LOADS);
-    let ids = falls(&acted_on(effects)).or_else(|| falls(loads)).or_else(|| falls(rates))?;
-    let (verb, it) = match effects {
-        [] => return None,
-        [_] => ("acts", "it"),
-        _ => ("act", "them"),
-    };
-    let shares: Vec<String> = ids
-        .iter()
-        .map(|id| format!("{}, {}", id.name(), shares(*id, given, tuned, after, it)))
-        .collect();
-    let next = most_left(after, &ids);
-    Some(format!("Where {} {verb}: {}{next}.", effects.join(" and "), shares.join("; ")))
+    falls(&acted_on(effects)).or_else(|| falls(loads)).or_else(|| falls(rates))
 }
 
 /// The unexplained shares of the channel `id` by each model, %. `it` stands for the effects of `after`.

@@ -100,7 +100,7 @@ fn where_it_fails(d: &Diagnosis, failing: Option<&Comparison>) -> Section {
     figures.extend(failing.and_then(|c| maps(d, c)));
     if !d.channels.is_empty() {
         figures.push(left(d));
-        figures.push(worst(d));
+        figures.extend(worst(d));
     }
     let note = "Left, in the table and in the bars: the share of each channel's variation that is neither explained by \
                 the model nor by the sensors' noise. “Tuned” is the model with its own coefficients fitted first: \
@@ -215,7 +215,8 @@ fn left(d: &Diagnosis) -> Figure {
     Figure::Bars(Bars { title: "Left unexplained".into(), unit: "%".into(), keys, groups, full })
 }
 
-fn worst(d: &Diagnosis) -> Figure {
+/// Table of the regimes in which most is left; `None` if no channel has one.
+fn worst(d: &Diagnosis) -> Option<Figure> {
     use crate::Align::Left;
     let columns = [("Channel", Left), ("What is left", Left), ("Goes with", Left)];
     let mut table = Table::new("Worst regime", &columns);
@@ -226,5 +227,5 @@ fn worst(d: &Diagnosis) -> Figure {
             table.push([channel_of(&channel.channel), worst, term]);
         }
     }
-    Figure::Table(table)
+    (!table.rows.is_empty()).then_some(Figure::Table(table))
 }

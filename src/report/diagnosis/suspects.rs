@@ -100,39 +100,51 @@ fn detail(c: &Candidate) -> Vec<String> {
     std::iter::once(what).chain(refused).collect()
 }
 
+/// The candidates of the section [`curves`]: the asserted ones that have curves, then the nearest of the others. Without an
+/// asserted effect, the nearest candidate comes first even if it has no curve, because the answer names it.
+fn shown(d: &Diagnosis) -> Vec<&Candidate> {
+    let none = d.effects.iter().all(|c| !c.asserted);
+    let nearest = d.effects.first().filter(|c| none && !c.parameters.is_empty());
+    let drawn = |asserted: bool| {
+        d.effects.iter().filter(move |c| c.asserted == asserted && c.curve.is_some())
+    };
+    let undrawn = nearest.filter(|c| c.curve.is_none());
+    drawn(true).chain(undrawn).chain(drawn(false).take(CURVES)).collect()
+}
+
 pub(crate) fn curves(d: &Diagnosis) -> Section {
-    let with = |asserted: bool| {
-        let of = d.effects.iter().filter(move |c| c.asserted == asserted);
-        of.filter_map(|c| Some((c, c.curve.as_ref()?)))
-    };
-    let options: Vec<ChoiceOption> = with(true)
-        .chain(with(false).take(CURVES))
-        .map(|(c, curve)| ChoiceOption { name: c.id.clone(), figures: figures(c, curve) })
-        .collect();
-    if options.is_empty() {
-        return Section::default();
-    }
+    let shown = shown(d);
+    let Some(first) = shown.first() else { return Section::default() };
+    let option = |c: &&Candidate| ChoiceOption { name: c.id.clone(), figures: figures(c) };
+    let options: Vec<ChoiceOption> = shown.iter().map(option).collect();
     let found: Vec<&str> = d.effects.iter().filter(|c| c.asserted).map(|c| c.id.as_str()).collect();
-    let beside = match found.len() < options.len() && !found.is_empty() {
-        true => format!(" Missing: {}; the others are no more than suspects.", found.join(", ")),
-        false => String::new(),
+    let mut beside = match (found.len(), options.len()) {
+        (0, _) => {
+            " An interval without zero proves no suspect: its evidence must exceed chance as well."
+                .into()
+        }
+        (some, all) if some < all => {
+            format!(" Missing: {}; the others are no more than suspects.", found.join(", "))
+        }
+        _ => String::new(),
     };
+    if first.curve.is_none() {
+        beside += &format!(" {}, the nearest, has no curve over a single variable.", first.id);
+    }
     let note = format!(
         "What the flights show that the tuned model without the effect does not (points, \
          averages over about 0.4 s), and what the effect contributes as fitted, with its \
          95 % interval.{beside}"
     );
-    let choice = Choice { anchor: ANCHOR.into(), label: "Effect".into(), options };
     // the title must not present candidates that are not asserted as findings
-    let title = match d.effects.iter().any(|c| c.asserted) {
-        true => "The effect",
-        false => "Nearest suspects, none proven",
-    };
+    let title = if found.is_empty() { "Nearest suspects, none proven" } else { "The effect" };
+    let choice = Choice { anchor: ANCHOR.into(), label: "Effect".into(), options };
     Section::new(title, &note, vec![Figure::Choice(choice)])
 }
 
-fn figures(c: &Candidate, curve: &Curve) -> Vec<Figure> {
-    vec![Figure::Xy(plot(c, curve)), Figure::Table(parameters(c))]
+fn figures(c: &Candidate) -> Vec<Figure> {
+    let curve = c.curve.as_ref().map(|curve| Figure::Xy(plot(c, curve)));
+    curve.into_iter().chain([Figure::Table(parameters(c))]).collect()
 }
 
 fn plot(c: &Candidate, curve: &Curve) -> XyFigure {

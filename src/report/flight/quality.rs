@@ -20,6 +20,10 @@ pub(crate) struct Kept {
     pub load_factor: [f64; 2],
     /// Largest angle of attack, degrees.
     pub alpha_deg: f64,
+    /// Smallest and largest roll, pitch and sideslip, degrees.
+    pub angles_deg: [[f64; 2]; 3],
+    /// Smallest and largest airspeed, m/s.
+    pub airspeed_mps: [f64; 2],
     /// Time outside each limit, s.
     pub outside_s: OutsideS,
     /// Whether any part of the flight was compared with the limits.
@@ -67,12 +71,19 @@ pub(crate) fn kept(samples: &[Sample], envelope: &EnvelopeFlown) -> Kept {
     let mut all = Kept {
         load_factor: [f64::NAN; 2],
         alpha_deg: f64::NAN,
+        angles_deg: [[f64::NAN; 2]; 3],
+        airspeed_mps: [f64::NAN; 2],
         outside_s: OutsideS::default(),
         judged: false,
         kept: true,
     };
     for part in parts {
-        let moments = part.iter().map(moment).collect();
+        let moments: Vec<Moment> = part.iter().map(moment).collect();
+        for m in &moments {
+            let angles = [m.attitude[0], m.attitude[1], m.beta].map(f64::to_degrees);
+            all.angles_deg.iter_mut().zip(angles).for_each(|(ends, x)| widen(ends, x));
+            widen(&mut all.airspeed_mps, m.airspeed);
+        }
         let track = Track { moments, target: nobody, before: None, lost_s: 0.0 };
         let Quality { load_factor: [least, most], alpha_deg, outside_s, kept, .. } =
             track.quality(&envelope.limits);
@@ -85,13 +96,18 @@ pub(crate) fn kept(samples: &[Sample], envelope: &EnvelopeFlown) -> Kept {
     all
 }
 
+/// Widens the range `ends` (smallest, largest) so that it contains `x`; NaN changes nothing.
+fn widen(ends: &mut [f64; 2], x: f64) {
+    *ends = [ends[0].min(x), ends[1].max(x)];
+}
+
 /// Part of a sentence that states the time outside the limits, the load factors and the largest angle of attack.
 pub(super) fn clause(kept: &Kept, limits: &Limits) -> String {
     if !kept.judged {
         return "the limits of the airframe file were not judged: no sample counts as flight"
             .into();
     }
-    format!("{}: {}", outside(kept), loads(kept, limits))
+    format!("{}: {}", outside(kept, limits), loads(kept, limits))
 }
 
 /// Phrase with the load factors and the largest angle of attack, each with its limits.
@@ -123,16 +139,57 @@ pub(super) fn left(kept: &Kept) -> bool {
     kept.judged && (!kept.kept || attitude_or_speed.iter().any(|seconds| *seconds > 0.0))
 }
 
-/// Phrase with the time outside the limits of the airframe file, in total and for each limit.
-pub(super) fn outside(kept: &Kept) -> String {
+/// Phrase with the time outside the limits of the airframe file. For each passed limit it states the value that was reached, the
+/// limit and the time.
+pub(super) fn outside(kept: &Kept, limits: &Limits) -> String {
     let seconds = kept.outside_s.any;
     if seconds <= 0.0 {
         return "inside every limit of the airframe file".to_owned();
     }
     let passed = kept.outside_s.passed();
-    let names: Vec<String> =
-        passed.iter().map(|(name, s)| format!("{name} {} s", number(*s))).collect();
-    format!("outside limits for {} s ({})", number(seconds), names.join(", "))
+    let one = |(name, s): &(&str, f64)| {
+        let what = match reached(name, kept, limits) {
+            Some(text) => text,
+            None => (*name).to_owned(),
+        };
+        match passed.len() {
+            1 => what,
+            _ => format!("{what}, for {} s", number(*s)),
+        }
+    };
+    let all: Vec<String> = passed.iter().map(one).collect();
+    format!("outside limits for {} s ({})", number(seconds), all.join("; "))
+}
+
+/// The value farthest beyond the limit `name`, a name of [`OutsideS::passed`], and the limit; `None` if the value is unknown.
+fn reached(name: &str, kept: &Kept, limits: &Limits) -> Option<String> {
+    let [roll, pitch, sideslip] = kept.angles_deg;
+    let farther = |[least, most]: [f64; 2], [low, high]: [f64; 2]| {
+        if low - least > most - high { (least, low) } else { (most, high) }
+    };
+    let (what, (value, limit), unit) = match name {
+        "bank" => ("roll", farther(roll, [-limits.bank_deg, limits.bank_deg]), "°"),
+        "pitch" => ("pitch", farther(pitch, limits.pitch_deg), "°"),
+        "load factor" => ("load factor", (kept.load_factor[1], limits.load_factor[1]), ""),
+        "least load factor" => ("load factor", (kept.load_factor[0], limits.load_factor[0]), ""),
+        "stall" => ("angle of attack", (kept.alpha_deg, limits.stall_deg), "°"),
+        "sideslip" => {
+            let most = limits.sideslip_deg;
+            ("sideslip", farther(sideslip, [-most, most]), "°")
+        }
+        "least airspeed" => ("airspeed", (kept.airspeed_mps[0], limits.airspeed_mps[0]), " m/s"),
+        "largest airspeed" => ("airspeed", (kept.airspeed_mps[1], limits.airspeed_mps[1]), " m/s"),
+        _ => return None,
+    };
+    let [value, limit] = apart(value, limit);
+    Some(format!("{what} {value}{unit}, limit {limit}{unit}"))
+}
+
+/// Two numbers with the same number of decimals, one or as many more as they need to differ.
+fn apart(a: f64, b: f64) -> [String; 2] {
+    let texts = |places: usize| [a, b].map(|x| format!("{x:.places$}").replace('-', "−"));
+    let different = (1..4).map(texts).find(|[a, b]| a != b);
+    different.unwrap_or_else(|| texts(4))
 }
 
 /// The largest value of the measure `of` over the segments; NaN if there is none.
@@ -199,6 +256,12 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_passed_limit_is_stated_with_the_value_reached() {
+        assert_eq!(apart(-30.1, -30.0), ["−30.1", "−30.0"]);
+        assert_eq!(apart(-30.04, -30.0), ["−30.04", "−30.00"]);
+    }
+
+    #[test]
     fn without_a_sample_in_flight_the_envelope_is_not_judged() {
         let limits = Limits {
             bank_deg: 60.0,
@@ -214,6 +277,9 @@ mod tests {
             let samples = [at(0.0), at(0.01), at(0.02)];
             clause(&kept(&samples, &EnvelopeFlown { limits, flying_from_mps: 8.0 }), &limits)
         };
+        assert!(said(11.96).starts_with(
+            "outside limits for 0.0200 s (airspeed 11.96 m/s, limit 12.00 m/s): load factor"
+        ));
         assert!(said(3.0).starts_with("the limits of the airframe file were not judged"));
         assert!(said(20.0).starts_with("inside every limit of the airframe file: "));
         assert!(said(20.0).contains(" (limits −1.00 to 2.20), "), "{}", said(20.0));

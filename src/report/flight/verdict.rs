@@ -32,7 +32,7 @@ impl Parts {
         let flown = report.envelope.map(|e| (kept(&report.flight.samples, &e), e.limits));
         let left_it = flown.as_ref().filter(|(kept, _)| left(kept));
         let mut first: Vec<String> =
-            left_it.map(|(kept, _)| capital(&outside(kept))).into_iter().collect();
+            left_it.map(|(kept, limits)| capital(&outside(kept, limits))).into_iter().collect();
         first.push(match all {
             0 if left_it.is_some() => {
                 format!("flew {:.1} s without a target", duration_s(&report.flight.samples))

@@ -16,7 +16,7 @@ use greylag_logs::Sampling;
 use greylag_model::{GreyBox, Integrator, Memory};
 use greylag_num::Real;
 use greylag_physics::rigid_body::{self, ForceAxes, RigidBody, Vector};
-use greylag_physics::{AirData, Channel, State, Wrench};
+use greylag_physics::{AirData, Channel, Controls, State, Wrench};
 
 /// Approximate number of windows of a flight in which the sensitivity to sensor noise is evaluated.
 const NOISE_WINDOWS: usize = 40;
@@ -149,12 +149,12 @@ struct Load {
 impl Load {
     fn at(model: &GreyBox, at: &Instant) -> Load {
         let air = model.air(&at.state, at.altitude);
-        let wrench = model.wrench(&at.state, &at.controls, &air);
+        let [force, moment] = predicted(model, &at.state, &at.controls, &air);
         Load {
             measured_force: measured_force(model, at, &air),
-            force: predicted_force(model, &wrench, &air),
+            force,
             turning: gyroscopic(&model.body, &at.state),
-            moment: moments(&wrench),
+            moment,
         }
     }
 }
@@ -207,6 +207,27 @@ fn measured_force(model: &GreyBox, at: &Instant, air: &AirData) -> Vector<f64> {
     to_force_axes(force, air, model.axes)
 }
 
+/// Predicted D (less thrust), L and Y, N, and moment, N m. The learned residual of `model` adds the force and the moment that
+/// change the rates of the state as it does.
+fn predicted(
+    model: &GreyBox,
+    state: &State,
+    controls: &Controls,
+    air: &AirData,
+) -> [Vector<f64>; 2] {
+    let wrench = model.wrench(state, controls, air);
+    let (mut force, mut moment) = (predicted_force(model, &wrench, air), moments(&wrench));
+    if let Some(residual) = &model.residual {
+        let rate = residual.rate(state, controls);
+        let pull = rigid_body::acceleration_of(state, air, &rate).map(|a| a * model.body.mass);
+        let pull = to_force_axes(pull, air, model.axes);
+        let turn = inertia(&model.body, [rate.p, rate.q, rate.r]);
+        force = std::array::from_fn(|k| force[k] + pull[k]);
+        moment = std::array::from_fn(|k| moment[k] + turn[k]);
+    }
+    [force, moment]
+}
+
 pub(super) fn predicted_force(model: &GreyBox, wrench: &Wrench, air: &AirData) -> Vector<f64> {
     to_force_axes(rigid_body::body_force(wrench, air, model.axes), air, model.axes)
 }
@@ -255,7 +276,7 @@ pub(crate) fn gyroscopic<R: Real>(body: &RigidBody, state: &State<R>) -> Vector<
 fn moment(model: &GreyBox, samples: &[Instant], k: usize) -> Vector<f64> {
     let end = &samples[k + 1];
     let air = model.air(&end.state, end.altitude);
-    moments(&model.wrench(&end.state, &samples[k].controls, &air))
+    predicted(model, &end.state, &samples[k].controls, &air)[1]
 }
 
 fn moments(wrench: &Wrench) -> Vector<f64> {
@@ -331,4 +352,35 @@ pub(crate) fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
     let force: Vector<f64> = std::array::from_fn(|k| load.force[k] - measured[k]);
     let moment: Vector<f64> = std::array::from_fn(|k| load.moment[k] - load.turning[k]);
     std::array::from_fn(|k| [force, moment, [rate.airspeed, rate.alpha, rate.beta]][k / 3][k % 3])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn forces_and_moments_contain_the_learned_residual() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/learned/model.toml");
+        let model = GreyBox::load(&path).unwrap();
+        assert!(model.residual.is_some());
+        let state = State::from_array([0.1, 0.1, 18.0, 0.1, 0.1, 0.1, 0.05, 0.02]);
+        let (aileron, elevator) = (0.05, 0.02);
+        let controls = Controls { aileron, elevator, throttle: 0.5, rudder: 0.0, lagged: None };
+        let air = model.air(&state, 100.0);
+        let [[drag, lift, side], moment] = predicted(&model, &state, &controls, &air);
+        let mut wrench = Wrench::zero();
+        let forces = [(Channel::Drag, drag), (Channel::Lift, lift), (Channel::Side, side)];
+        forces.into_iter().for_each(|(channel, force)| wrench.add(channel, force));
+        let force = rigid_body::body_force(&wrench, &air, model.axes);
+        let gravity = rigid_body::gravity_in_body(&state, model.atmosphere.gravity);
+        let pull: Vector<f64> = std::array::from_fn(|k| force[k] / model.body.mass + gravity[k]);
+        let spin = rigid_body::angular_acceleration(&model.body, &state, moment);
+        let rate = rigid_body::state_rate(&state, &air, pull, spin).to_array();
+        let whole = model.rate(&state, &controls, 100.0).to_array();
+        // airspeed, body rates, α and β
+        for (x, y) in rate.iter().zip(&whole).skip(2) {
+            assert!((x - y).abs() < 1e-9 * (1.0 + y.abs()), "{rate:?} {whole:?}");
+        }
+    }
 }

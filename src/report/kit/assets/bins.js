@@ -90,7 +90,7 @@ function intervalChart(host, data) {
     scales: { x: { time: false, range: () => xr }, y: { range: () => yr } },
     axes: [
       axis(named
-        ? { size: 1.7 * rem(), splits: () => panel.names.map((_, i) => i), values: (u, s) => s.map((i) => shortened(panel.names[i] ?? "")), space: 10 }
+        ? { size: 1.7 * rem(), splits: (u) => thinned(u, panel.names), values: (u, s) => s.map((i) => shortened(panel.names[i] ?? "")), space: 10 }
         : { size: 1.7 * rem(), values: showTicks, space: 3.2 * rem() }),
       sideAxis({}),
     ],
@@ -114,6 +114,12 @@ function intervalChart(host, data) {
   return u;
 }
 const shortened = (text) => (text.length > 14 ? `${text.slice(0, 6)}…${text.slice(-7)}` : text);
+/** The indices of the names that fit beside each other under the plot: every one, every second one, and so on. */
+function thinned(u, names) {
+  const longest = Math.max(...names.map((name) => shortened(name).length));
+  const every = Math.max(1, Math.ceil((names.length * (0.5 * longest + 1) * rem()) / (u.width || 400)));
+  return names.map((_, i) => i).filter((i) => i % every === 0);
+}
 /** A touch moves the cursor as a mouse does. */
 function tapping(u) {
   for (const kind of ["pointerdown", "pointermove"]) u.over.addEventListener(kind, (e) => {

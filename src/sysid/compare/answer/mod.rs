@@ -217,6 +217,35 @@ mod tests {
     }
 
     #[test]
+    fn the_gain_is_shown_in_the_state_on_which_the_effect_acts() {
+        // sideslip gains 0.06 of its scale, airspeed 0.05
+        let scores = [
+            (Way::Given, score(0.08, 1.2, 0.03)),
+            (Way::Tuned, score(0.02, 0.6, 0.02)),
+            (Way::Effects, score(0.01, 0.1, 0.002)),
+        ];
+        let state = |effects| Answer::of(&subject(&scores, effects)).numbers.in_use.unwrap().state;
+        assert_eq!(state(vec![drag()]), "airspeed_mps");
+        assert_eq!(state(vec![Decisive { id: "no such effect".into(), ..drag() }]), "beta_rad");
+        // a gain of a hundredth in airspeed is not notable
+        let little = [
+            (Way::Given, score(0.08, 1.2, 0.03)),
+            (Way::Tuned, score(0.02, 0.6, 0.02)),
+            (Way::Effects, score(0.01, 0.59, 0.002)),
+        ];
+        let answer = Answer::of(&subject(&little, vec![drag()]));
+        assert_eq!(answer.numbers.in_use.as_ref().unwrap().state, "beta_rad");
+        // what is left is stated even if the sentence before it has the same state
+        let same = [
+            (Way::Given, score(0.08, 1.2, 0.03)),
+            (Way::Tuned, score(0.02, 0.6, 0.02)),
+            (Way::Effects, score(0.01, 0.1, 0.001)),
+        ];
+        let answer = Answer::of(&subject(&same, vec![drag()]));
+        assert_eq!(answer.left, "Largest error left: airspeed, 0.1 m/s after 5 s.");
+    }
+
+    #[test]
     fn what_makes_it_worse_rises() {
         let scores = [
             (Way::Given, score(0.02, 0.5, 0.01)),
@@ -244,6 +273,7 @@ mod tests {
         );
         // the largest error is that of the model as given, and no gain of the tuned model is praised
         assert_eq!(tuned.left, "Largest error of the model as given: airspeed, 0.5 m/s after 5 s.");
+        assert_eq!(tuned.summary(), "error at 5 s 0.02 (model as it is)");
         assert_eq!(tuned.effect, "");
         let fitted = Answer::of(&Subject { seen: Seen::Of(2), ..subject(&scores, Vec::new()) });
         assert_eq!(

@@ -8,9 +8,16 @@ use serde::Serialize;
 
 use super::{ANSWER_S, Seen, Stage, Subject};
 use crate::compare::result::{HorizonScore, StateScore};
+use greylag_physics::Channel;
+use greylag_physics::catalogue::describe;
 
 /// Magnitude of a change of the error, %, below which the error counts as unchanged.
 pub(super) const NOTICED: f64 = 0.05;
+
+/// The error of a state on which an added effect acts falls notably if it falls by at least this fraction.
+const NOTABLY: f64 = 0.3;
+/// Smallest notable fall of the error relative to x_c, as a fraction of the largest fall of any state.
+const BESIDE: f64 = 0.1;
 
 /// Derivation of a model from the model before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -70,7 +77,8 @@ impl Decisive {
     }
 }
 
-/// The state whose root mean square error, relative to its scale x_c, decreases most.
+/// The state whose root mean square error, relative to its scale x_c, decreases most. A state on which the added effects act
+/// directly is preferred if its error falls notably.
 ///
 /// The last model is compared with the model before it if effects were added to it. Otherwise it is compared with the first
 /// model.
@@ -122,7 +130,7 @@ pub struct Numbers {
     pub baseline: Option<Baseline>,
     /// Effects that the last model has and the first model lacks.
     pub effects: Vec<Decisive>,
-    /// The state whose prediction improves most; `None` if no prediction improves.
+    /// The state whose prediction shows the improvement best; `None` if no prediction improves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub in_use: Option<InUse>,
     /// The state with the largest remaining error, under the first model if tuning it is in vain. `None` if no horizon is
@@ -163,7 +171,9 @@ impl Numbers {
             change_percent,
             baseline,
             effects: subject.effects.clone(),
-            in_use: before.zip(at.last()).and_then(|(before, after)| in_use(before, after)),
+            in_use: before
+                .zip(at.last())
+                .and_then(|(before, after)| in_use(before, after, &subject.effects)),
             left: kept.and_then(|kept| left(kept)),
             steps,
         }
@@ -233,13 +243,40 @@ fn change(from: f64, to: f64) -> f64 {
     100.0 * (to / from - 1.0)
 }
 
-fn in_use(before: &HorizonScore, after: &HorizonScore) -> Option<InUse> {
+fn in_use(before: &HorizonScore, after: &HorizonScore, effects: &[Decisive]) -> Option<InUse> {
     let gain = |(a, b): (&StateScore, &StateScore)| {
         let gain = a.rmse_scaled - b.rmse_scaled;
         (gain > 0.0).then_some((gain, InUse { state: a.state, before: a.rmse, after: b.rmse }))
     };
-    let gains = before.states.iter().zip(&after.states).filter_map(gain);
-    gains.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, found)| found)
+    let gains: Vec<(f64, InUse)> =
+        before.states.iter().zip(&after.states).filter_map(gain).collect();
+    let own = states_of(effects);
+    let largest = gains.iter().map(|(gain, _)| *gain).fold(0.0, f64::max);
+    let notable = |(gain, used): &(f64, InUse)| {
+        *gain >= BESIDE * largest && used.after <= (1.0 - NOTABLY) * used.before
+    };
+    let direct = |of: &(f64, InUse)| own.contains(&of.1.state) && notable(of);
+    let most = |a: &&(f64, InUse), b: &&(f64, InUse)| a.0.total_cmp(&b.0);
+    let found = gains.iter().filter(|of| direct(of)).max_by(most);
+    found.or_else(|| gains.iter().max_by(most)).map(|(_, used)| used.clone())
+}
+
+/// States that the channels of `effects` change directly, according to the catalogue. Empty for effects on the deflections.
+fn states_of(effects: &[Decisive]) -> Vec<&'static str> {
+    let entries = effects.iter().filter_map(|e| describe(&e.id)?.entry);
+    entries.flat_map(|entry| entry.channels.iter().flat_map(changed_by).copied()).collect()
+}
+
+/// States that a force or moment in `channel` changes directly.
+fn changed_by(channel: &Channel) -> &'static [&'static str] {
+    match channel {
+        Channel::Drag | Channel::BodyX => &["airspeed_mps"],
+        Channel::Lift => &["alpha_rad"],
+        Channel::Side => &["beta_rad"],
+        Channel::Roll => &["roll_rad"],
+        Channel::Pitch => &["pitch_rad", "alpha_rad"],
+        Channel::Yaw => &["beta_rad", "r_radps"],
+    }
 }
 
 fn left(last: &HorizonScore) -> Option<Left> {

@@ -183,8 +183,7 @@ fn in_use(n: &Numbers, used: &InUse, subject: &str) -> String {
     )
 }
 
-/// Sentence on the state with the largest remaining error relative to its scale. It is empty if there is no error, or if the
-/// sentence of [`effect`] already states the error of this state.
+/// Sentence on the state with the largest remaining error relative to its scale. It is empty if there is no error.
 pub fn left(n: &Numbers) -> String {
     let Some(Left { state, rmse }) = &n.left else { return String::new() };
     let (name, unit, factor) = people(state);
@@ -192,15 +191,15 @@ pub fn left(n: &Numbers) -> String {
     match n.steps.len() {
         0 | 1 => format!("Of the predicted states, {name} is worst: {error}."),
         _ if n.in_vain() => format!("Largest error of the model as given: {name}, {error}."),
-        _ if n.in_use.as_ref().is_some_and(|used| used.state == *state) => String::new(),
         _ => format!("Largest error left: {name}, {error}."),
     }
 }
 
-/// The change of the error as a short phrase.
+/// The change of the error as a short phrase. If tuning is in vain, the phrase states the error of the model as it is.
 pub fn summary(n: &Numbers) -> String {
     let at = format!("error at {} s", number(n.horizon_s));
     match &n.steps[..] {
+        [given, ..] if n.in_vain() => format!("{at} {} (model as it is)", number(given.error)),
         [] => "no free run is long enough for an error".into(),
         [only] => format!("{at} {}", number(only.error)),
         [first, .., last] => {

@@ -95,7 +95,7 @@ fn of_unknown(
     measurement.extend(per_flight::angles(found.round()));
     let trims = per_flight::trims(found.round());
     let (verdict, why_unknown) = spoken(&found, &doubtful, &channels, faultless);
-    notes.extend(sentences::notes(&found, model, options));
+    notes.extend(sentences::notes(&found, model, verdict, options));
     let decoys = match options.detail {
         Detail::Full => decoys::decoys(&found, options.seed),
         Detail::Lean => Vec::new(),

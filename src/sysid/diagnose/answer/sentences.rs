@@ -7,6 +7,7 @@ use crate::diagnose::answer::result::{
 };
 use crate::diagnose::answer::{per_flight, shares, verdict};
 use crate::diagnose::options::Options;
+use crate::diagnose::regression::sensors::BLUR;
 use crate::diagnose::search::stepwise::Found;
 use crate::per_flight::askew;
 use greylag_model::GreyBox;
@@ -223,7 +224,7 @@ pub fn figures(x: f64) -> String {
 
 /// Notes on coefficients and sensor errors far from their prior values, on what a flexible model could remove, on constants
 /// of single flights, and on effects that were left out of the search.
-pub fn notes(found: &Found, model: &GreyBox, options: &Options) -> Vec<String> {
+pub fn notes(found: &Found, model: &GreyBox, verdict: Verdict, options: &Options) -> Vec<String> {
     let mut notes = Vec::new();
     for t in shares::tuned(found, model) {
         let off = (t.value - t.prior).abs() / t.prior_sd;
@@ -242,28 +243,55 @@ pub fn notes(found: &Found, model: &GreyBox, options: &Options) -> Vec<String> {
          noise's variance; {:.0} is reached by chance. By channel (D L Y l m n): {:.0?}.",
         found.remainder.total, found.remainder.total_threshold, found.remainder.removable
     ));
-    let round = found.round();
-    let own = round.per_flight.constants().len() * round.flights.len();
-    for (k, known) in round.known.iter().enumerate().skip(round.coefficients.len() + own) {
-        let off = round.projected.tuned[k] / known.width;
-        if off.abs() > FAR + 1.0 {
-            notes.push(format!(
-                "{} would have to be {off:+.1} standard deviations beyond what its flight path says: something \
-                 that acts like it may be missing.",
-                known.name
-            ));
-        }
-    }
-    notes.extend(per_flight::notes(round));
+    notes.extend(sensors_far_off(found, verdict));
+    notes.extend(per_flight::notes(found.round()));
     if !options.without.is_empty() {
         notes.push(format!("Left out of the catalogue: {}.", options.without.join(", ")));
     }
     notes
 }
 
+/// Notes on the sensor errors far from what the reconstruction says about them.
+fn sensors_far_off(found: &Found, verdict: Verdict) -> Vec<String> {
+    let round = found.round();
+    let own = round.per_flight.constants().len() * round.flights.len();
+    let of_sensors = round.known.iter().enumerate().skip(round.coefficients.len() + own);
+    let off = of_sensors.map(|(k, known)| (known, round.projected.tuned[k] / known.width));
+    let far = off.filter(|(_, off)| off.abs() > FAR + 1.0);
+    far.map(|(known, off)| far_off(&known.name, off, verdict)).collect()
+}
+
+/// Note on the sensor error `name`, which is `off` standard deviations from what the reconstruction says about it.
+fn far_off(name: &str, off: f64, verdict: Verdict) -> String {
+    let smoothing = name.starts_with(BLUR);
+    let what = if smoothing { " (a smoothing of the recorded deflections)" } else { "" };
+    let end = match (verdict, smoothing) {
+        (Verdict::Adequate, true) => {
+            "its effect is small, and no missing effect was found that acts like it"
+        }
+        (Verdict::Adequate, false) => "no missing effect was found that acts like it",
+        _ => "something that acts like it may be missing",
+    };
+    format!(
+        "{name}{what} would have to be {off:+.1} standard deviations beyond what its flight path says: {end}."
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_smoothing_of_the_record_does_not_contradict_an_adequate_model() {
+        let name = "blur_actuators of flight a.csv";
+        let adequate = far_off(name, -10.3, Verdict::Adequate);
+        assert!(
+            adequate.contains("(a smoothing of the recorded deflections) would have to be -10.3")
+        );
+        assert!(adequate.ends_with("no missing effect was found that acts like it."), "{adequate}");
+        let unexplained = far_off(name, -10.3, Verdict::Unexplained);
+        assert!(unexplained.ends_with("acts like it may be missing."), "{unexplained}");
+    }
 
     #[test]
     fn only_stated_manoeuvres_are_to_be_flown() {

@@ -21,9 +21,11 @@ pub const NAMES: [&str; SENSORS] = [
     "skew_accelerometer",
     "skew_moments",
     LATE,
-    "blur_actuators",
+    BLUR,
 ];
 
+/// Name of the averaging of the actuator record.
+pub const BLUR: &str = "blur_actuators";
 /// Name of the delay of the actuator record.
 pub const LATE: &str = "skew_actuators";
 /// Index of the delay of the actuator record in [`NAMES`].
