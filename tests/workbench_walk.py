@@ -448,7 +448,7 @@ def walk(browser, bench, greylag, flights, folder, session):
         found.append(f"the tick changes what was said before it: {ahead}; then {header}")
     if "by tuning" not in browser.value("document.getElementById('box')?.textContent ?? ''"):
         found.append("the answer box is not in the model's pane")
-    for place, what in {"#suspects .next": "judge it on the test flights", "#then": "Judge measures"}.items():
+    for place, what in {"#suspects .verdict": "Next", "#then": "Judge measures"}.items():
         if what not in browser.value(f"document.querySelector('{place}')?.textContent ?? ''"):
             found.append(f"after the tick {place} names no next step")
     # each suspect above chance has its verdict
