@@ -448,6 +448,13 @@ def walk(browser, bench, greylag, flights, folder, session):
         found.append(f"the tick changes what was said before it: {ahead}; then {header}")
     if "by tuning" not in browser.value("document.getElementById('box')?.textContent ?? ''"):
         found.append("the answer box is not in the model's pane")
+    for place, what in {"#suspects .verdict": "Next", "#then": "Judge measures"}.items():
+        if what not in browser.value(f"document.querySelector('{place}')?.textContent ?? ''"):
+            found.append(f"after the tick {place} names no next step")
+    # each suspect above chance has its verdict
+    unsaid = "[...document.querySelectorAll('#suspects .list > .suspect')].filter(s => !s.querySelector('.tag') && !s.querySelector('input').checked).map(s => s.querySelector('label').textContent).join()"
+    if ids := browser.value(unsaid):
+        found.append(f"suspects above chance without a verdict: {ids}")
     click(browser, "#judge")
     wait(browser, "document.getElementById('opened')", 60, "the judgement")
     if browser.value("document.querySelectorAll('.locked').length"):

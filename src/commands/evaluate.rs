@@ -3,11 +3,12 @@
 mod any;
 mod derivatives;
 mod draws;
+mod next;
 mod tables;
 mod targets;
 
 use std::io::IsTerminal;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
@@ -25,9 +26,8 @@ use crate::control::cem::Change;
 use crate::control::envelope::Guarded;
 use crate::control::quality::Limits;
 use crate::control::{Controller, ControllerKind, Needs, Source, Target, build};
-use crate::logs::quoted;
 use crate::model::GreyBox;
-use crate::report::{EvaluationReport, evaluation_best};
+use crate::report::EvaluationReport;
 use crate::sim::episode::STEPS;
 use crate::sim::evaluation::{Course, Evaluation, evaluate_courses};
 use crate::sim::tracking::{Tracking, track};
@@ -135,6 +135,13 @@ pub struct Arguments {
     force: bool,
 }
 
+impl Arguments {
+    /// Whether the controllers fly with the envelope limiter.
+    fn limited(&self) -> bool {
+        self.envelope == EnvelopeName::Kept
+    }
+}
+
 /// Protection between a controller and the surfaces: the envelope limiter, or none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum EnvelopeName {
@@ -185,9 +192,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         .iter()
         .map(|e| one(arguments.seed, e, &courses, &limits, &plant))
         .collect::<Result<Vec<_>>>()?;
-    let then = next(arguments, &evaluations, &plant);
+    let then = next::next(arguments, &evaluations, &plant);
     if !files::is_stdout(arguments.json.as_deref()) {
-        tables::print(&evaluations);
+        tables::print(&evaluations, arguments.limited());
         print_next(&then);
     }
     if let Some(path) = &arguments.json {
@@ -244,37 +251,11 @@ fn page(
         subtitle: subtitle(arguments),
         evaluations,
         flights,
+        limited: arguments.limited(),
         next,
         provenance: provenance.map(|(k, v)| (k.into(), v)).to_vec(),
     };
     report.page().render()
-}
-
-/// The `greylag demo` command for the best controller. It is empty if several models were given, or several policies and the
-/// controller uses one, because the controller's name does not state which of them it used. It is also empty for a user's own
-/// aircraft, because the command would have to repeat the options of the aircraft.
-fn next(arguments: &Arguments, evaluations: &[Evaluation], plant: &PlantOptions) -> String {
-    let best = evaluation_best(evaluations);
-    let kind =
-        arguments.controllers.iter().find(|k| best.is_some_and(|e| e.controller == k.name()));
-    let (Some(kind), [model], None) = (kind, &arguments.models[..], &plant.aircraft_dir) else {
-        return String::new();
-    };
-    let mut command = format!("greylag demo --aircraft {} --controller {kind}", plant.aircraft);
-    if model != Path::new(fly::MODEL) {
-        command += &format!(" --model {}", quoted(model));
-    }
-    match (kind.needs(), &arguments.policies[..]) {
-        (Needs::Gains | Needs::Model, _) => (),
-        (_, [policy]) if policy == Path::new(controllers::POLICY) => (),
-        (_, [policy]) => command += &format!(" --policy {}", quoted(policy)),
-        _ => return String::new(),
-    }
-    if kind.searches() && !arguments.changes.is_empty() {
-        command += " --planner";
-        arguments.changes.iter().for_each(|change| command += &format!(" {change}"));
-    }
-    command
 }
 
 /// Description of the evaluation in one line.
@@ -327,7 +308,7 @@ fn entrants(arguments: &Arguments, models: &[GreyBox]) -> Result<Vec<Entrant>> {
             let agent = controllers::policy(*kind, model, folder)?;
             let changes = &arguments.changes;
             let mut controller = build(*kind, Source { model, agent: agent.as_ref(), changes })?;
-            if arguments.envelope == EnvelopeName::Kept {
+            if arguments.limited() {
                 controller = Box::new(Guarded::new(controller, model));
             }
             if agent.is_some() {

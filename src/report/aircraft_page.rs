@@ -1,16 +1,14 @@
 //! The HTML page about an aircraft: three views, and trim, modes, stability margins and control responses computed from its model.
 
 use std::fmt::Write;
-use std::path::Path;
 
 use crate::Align::{Left, Right};
 use crate::kit::numbers::number;
 use crate::{
     Drawing, Figure, Outcome, Page, Panel, Section, Series, Style, Table, TimeFigure, Verdict,
 };
-use greylag_control::aircraft_check::AircraftCheck;
+use greylag_control::aircraft_check::{AircraftCheck, Level};
 use greylag_control::stick_response::{STEPPED, StickResponse};
-use greylag_logs::quoted;
 use greylag_model::GreyBox;
 
 /// Contents of the page about an aircraft.
@@ -24,6 +22,10 @@ pub struct AircraftReport<'a> {
     pub responses: &'a [StickResponse; 2],
     /// Path of the model's file.
     pub model_file: String,
+    /// Whether coefficients of the model were fitted to flights.
+    pub fitted: bool,
+    /// The command that the user should run next; empty if there is none.
+    pub next: String,
     /// The command line that generated the page.
     pub command_line: String,
 }
@@ -67,7 +69,6 @@ impl AircraftReport<'_> {
 
     fn verdict(&self) -> Verdict {
         let AircraftCheck { findings, level_up_to, controller, .. } = self.check;
-        let envelope = self.model.airframe.envelope;
         let mut details = vec![format!(
             "Controller to begin with: {}; its loops tolerate {:.0} ms of delay (stability margins below).",
             controller.name,
@@ -79,33 +80,44 @@ impl AircraftReport<'_> {
                 number(v)
             )
         }));
-        let model = quoted(Path::new(&self.model_file));
-        let flies = format!(
-            "flies straight from {} to {} m/s",
-            number(envelope.airspeed_min_mps),
-            number(envelope.airspeed_max_mps)
-        );
         match findings.split_first() {
-            None => Verdict {
-                outcome: Outcome::Sound,
-                reason: String::new(),
-                sentence: format!("It {flies}; nothing needs correction."),
-                details,
-                before_next:
-                    "fly it, then fit it (FLIGHTS: the logs of its flights; FOLDER: a new folder):"
-                        .into(),
-                next: format!(
-                    "greylag amend --model {model} --log FLIGHTS --tune-only --out FOLDER"
-                ),
-            },
+            None => {
+                let advice = if self.fitted { COMPARE } else { RECORD };
+                details.push(advice.into());
+                Verdict {
+                    outcome: Outcome::Sound,
+                    reason: "by its own numbers; no flight was compared".into(),
+                    sentence: self.flies(),
+                    details,
+                    before_next: "fly it in simulation:".into(),
+                    next: self.next.clone(),
+                }
+            }
             Some((first, rest)) => Verdict {
                 outcome: Outcome::Faulty,
                 reason: String::new(),
                 sentence: format!("To correct before a flight: {first}."),
                 details: rest.iter().cloned().chain(details).collect(),
-                before_next: String::new(),
-                next: format!("greylag aircraft check --model {model}"),
+                before_next: "correct it, then check it again:".into(),
+                next: self.next.clone(),
             },
+        }
+    }
+
+    /// Sentence on the airspeeds of level flight.
+    fn flies(&self) -> String {
+        let AircraftCheck { levels, level_up_to, .. } = self.check;
+        let envelope = self.model.airframe.envelope;
+        let to = number(level_up_to.unwrap_or(envelope.airspeed_max_mps));
+        match levels.iter().find(|l| is_level(l)) {
+            Some(slowest) => {
+                format!("It flies level from {} to {to} m/s.", number(slowest.airspeed))
+            }
+            None => format!(
+                "It flies straight from {} to {} m/s, never level.",
+                number(envelope.airspeed_min_mps),
+                number(envelope.airspeed_max_mps)
+            ),
         }
     }
 
@@ -122,12 +134,8 @@ impl AircraftReport<'_> {
             let [alpha, path] = [l.alpha, l.path].map(f64::to_degrees);
             let row = [l.airspeed, alpha, 100.0 * l.elevator, 100.0 * l.throttle];
             let row = row.map(|x| format!("{x:.1}").replace('-', "−"));
-            // a flight-path angle below 0.05° counts as level
-            let path = if path.abs() < 0.05 {
-                "level".into()
-            } else {
-                format!("{path:.1}").replace('-', "−")
-            };
+            let path =
+                if is_level(l) { "level".into() } else { format!("{path:.1}").replace('-', "−") };
             table.push(row.into_iter().chain([path]));
         }
         table
@@ -232,6 +240,15 @@ impl AircraftReport<'_> {
         table.push(["Command line".to_string(), self.command_line.clone()]);
         table
     }
+}
+
+/// Advice for a model that was fitted to flights, and for one that was not.
+const COMPARE: &str = "It was fitted to flights. How well it predicts is shown by a comparison with a flight that the fit did not use.";
+const RECORD: &str = "No flight has been fitted to it: record flights, then fit it to their logs.";
+
+/// Whether straight flight is level: its flight-path angle is below 0.05°.
+fn is_level(l: &Level) -> bool {
+    l.path.to_degrees().abs() < 0.05
 }
 
 const SKETCH_NOTE: &str = "Span and mean chord to scale; the shapes of the body and the tail are typical ones, because \

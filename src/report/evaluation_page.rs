@@ -2,6 +2,7 @@
 //! planners.
 
 pub(crate) mod answer;
+mod excess;
 pub(crate) mod names;
 mod way;
 
@@ -28,6 +29,8 @@ pub struct EvaluationReport<'a> {
     pub evaluations: &'a [Evaluation],
     /// Single flights: each target with one flight of each controller, in the order of `evaluations`.
     pub flights: &'a [(Target, Vec<Tracking>)],
+    /// Whether the controllers flew with the envelope limiter.
+    pub limited: bool,
     /// The command that the user should run next; empty if there is none.
     pub next: String,
     /// Inputs of the evaluation, such as files and options, as pairs of name and value.
@@ -61,7 +64,7 @@ impl EvaluationReport<'_> {
     fn verdict(&self) -> Section {
         let plain = |sentence: String| Finding { sentence, link: None };
         let mut lead: Vec<Finding> =
-            answer::sentences(self.evaluations).into_iter().map(plain).collect();
+            answer::sentences(self.evaluations, self.limited).into_iter().map(plain).collect();
         // the first sentence, on the best controller, is prominent
         let rest = lead.split_off(lead.len().min(1));
         let next = self.next.clone();
@@ -271,7 +274,7 @@ mod tests {
     fn the_answer_names_the_best_and_whether_the_targets_tell_it_from_the_next() {
         let answer = |errors: [f64; 2]| {
             let [a, b] = errors;
-            answer::sentences(&[evaluated("hybrid", a), evaluated("lqi", b)])
+            answer::sentences(&[evaluated("hybrid", a), evaluated("lqi", b)], false)
         };
         let said = answer([0.25, 0.1]);
         assert_eq!(
@@ -279,15 +282,16 @@ mod tests {
             [
                 "Best: lqi. It keeps its limits of load factor and angle of attack in all 8 flights and settles on average within 0.100° of the command \
                  (95 %: 0.100 to 0.100°).",
+                "Flown without the envelope limiter.",
                 "Its worst target: roll +10°, pitch +5°, settled error 0.100°.",
                 "Behind it: hybrid 0.250°.",
                 "No target was lost."
             ]
         );
         let alike = answer([0.1, 0.1]);
-        assert_eq!(alike[2], "Not distinguished from it by these targets: lqi 0.100°.");
-        assert!(answer::sentences(&[]).is_empty());
-        let alone = answer::sentences(&[evaluated("lqi", 0.1)]);
+        assert_eq!(alike[3], "Not distinguished from it by these targets: lqi 0.100°.");
+        assert!(answer::sentences(&[], false).is_empty());
+        let alone = answer::sentences(&[evaluated("lqi", 0.1)], false);
         assert!(
             alone[0].starts_with("lqi keeps its limits of load factor and angle of attack"),
             "{alone:?}"
@@ -315,10 +319,10 @@ mod tests {
             e.groups.iter_mut().for_each(|s| s.kept_rate = kept);
         }
         assert_eq!(answer::best(&all).unwrap().controller, "hybrid-ilqr");
-        let said = answer::sentences(&all);
+        let said = answer::sentences(&all, true);
         assert!(said[0].starts_with("Best: hybrid-ilqr. It keeps"), "{said:?}");
         assert_eq!(
-            said[2],
+            said[3],
             "Behind it: lqi 0.00200°, but outside the limits of load factor or angle of attack in 4 of 8."
         );
         // a controller that leaves the envelope in up to one flight in twenty keeps its rank
@@ -335,6 +339,7 @@ mod tests {
             subtitle: String::new(),
             evaluations: &evaluations,
             flights: &[],
+            limited: false,
             next: String::new(),
             provenance: Vec::new(),
         };
@@ -364,6 +369,7 @@ mod tests {
             subtitle: "Flown in JSBSim".into(),
             evaluations: &evaluations,
             flights: &flights,
+            limited: true,
             next: "greylag demo --controller lqi".into(),
             provenance: vec![("seed".into(), "1".into())],
         };
@@ -373,6 +379,7 @@ mod tests {
             "hybrid in the paper",
             "Next: <code>greylag demo --controller lqi</code>",
             "<p>Best: lqi. It keeps its limits of load factor and angle of attack in all",
+            "Flown with the envelope limiter.",
             "0.440 [0.410, 0.490]",
             "Roll seen ahead at 0.10 s",
             "plan flown",

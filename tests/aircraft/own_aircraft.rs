@@ -87,11 +87,25 @@ fn the_airspeed_beyond_which_level_flight_ends_is_said() {
     let faster = airframe.replace(&format!("airspeed_max_mps = {end}"), "airspeed_max_mps = 40.0");
     fs::write(folder.join("airframe.toml"), faster).unwrap();
     let model = folder.join("model.toml");
-    let said = text(&greylag(&["aircraft", "check", "--model", model.to_str().unwrap()]).stdout);
+    let page = folder.join("aircraft.html");
+    let [file, out] = [&model, &page].map(|path| path.to_str().unwrap());
+    let said = text(&greylag(&["aircraft", "check", "--model", file, "--report", out]).stdout);
     let (_, rest) = said.split_once("cannot fly level above ").unwrap_or_else(|| panic!("{said}"));
     let fastest: f64 = rest.split(' ').next().unwrap().parse().unwrap();
     // `new` ended the envelope there, to a tenth
     assert!((fastest - end.parse::<f64>().unwrap()).abs() < 0.11, "{fastest} {end}");
+    // the page promises no level flight beyond it, and the command that comes next runs as printed
+    let html = fs::read_to_string(&page).unwrap();
+    let (_, level) = html.split_once("It flies level from ").unwrap_or_else(|| panic!("{html}"));
+    assert!(!level.split_once(" m/s").unwrap().0.contains("40"), "{level}");
+    for part in ["Sound by its own numbers; no flight was compared", "No flight has been fitted"] {
+        assert!(html.contains(part), "the page lacks {part}");
+    }
+    let (_, next) = said.split_once("next: greylag ").unwrap_or_else(|| panic!("{said}"));
+    let next: Vec<&str> = next.trim().split(' ').collect();
+    assert_eq!(next[0], "evaluate", "{next:?}");
+    let flown = greylag(&[&next[..], &["--every", "60"]].concat());
+    assert!(flown.status.success(), "{}", text(&flown.stderr));
 }
 
 #[test]

@@ -35,10 +35,22 @@ fn evaluate_writes_scores_as_json_and_never_over_a_file() {
     let arguments = ["evaluate", "--controller", "pid", "lqi", "--targets", targets, "--json", out];
     let output = greylag(&arguments);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    // the last line is a command that flies the best controller; the model of all is named once
+    // both leave a limit in the corner: the last line flies the same with the limiter, and after that the best controller
     let said = String::from_utf8(output.stdout).unwrap();
     let next = said.lines().next_back().unwrap();
-    assert!(next.starts_with("next: greylag demo --aircraft x8 --controller "), "{said}");
+    let same = "greylag evaluate --controller pid lqi --targets ";
+    assert!(next.starts_with(&format!("next: {same}")), "{said}");
+    assert!(next.ends_with(" --envelope kept"), "{said}");
+    let whole = said.replace("\n  ", " ");
+    for part in ["Flown without the envelope limiter.", "Outside the limits: ", " (limit 2.20)"] {
+        assert!(whole.contains(part), "{part}: {said}");
+    }
+    let limited = greylag(&[&arguments[..6], &["--envelope", "kept"]].concat());
+    let kept = String::from_utf8(limited.stdout).unwrap();
+    let next = kept.lines().next_back().unwrap();
+    assert!(next.starts_with("next: greylag demo --aircraft x8 --controller "), "{kept}");
+    assert!(kept.contains("Flown with the envelope limiter."), "{kept}");
+    // the model of all is named once
     assert!(said.contains("model of all controllers that need one: prior-severe-learned"));
     let scores: serde_json::Value = serde_json::from_slice(&fs::read(&json).unwrap()).unwrap();
     assert_eq!(scores["schema"], "greylag.evaluation/1");

@@ -9,14 +9,19 @@ use comfy_table::Table;
 use comfy_table::presets::NOTHING;
 use serde::Serialize;
 
-use crate::commands::files::{self, JsonArgument, Overwrite};
+use crate::commands::files::{self, JsonArgument, Overwrite, shipped};
 use crate::commands::given;
 use crate::commands::status::IN_DOUBT;
+use crate::commands::terminal::print_next;
 use crate::control::aircraft_check::{self, AircraftCheck};
 use crate::control::stick_response::stick_responses;
+use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::model::modes::Mode;
 use crate::report::AircraftReport;
+
+/// Name of the airframe that `greylag demo` flies by default.
+const SIMULATED: &str = "Skywalker X8";
 
 /// Options of `greylag aircraft check`.
 #[derive(clap::Args)]
@@ -57,6 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             model.airframe.reference.altitude
         );
         print(&found);
+        print_next(&next(&arguments.model, &model, &found));
     }
     let document = Document { model: &model.name, airframe: &model.airframe.name, found: &found };
     arguments.json.write("greylag.aircraft-check/1", &document, Overwrite::New)?;
@@ -76,14 +82,35 @@ pub fn status(found: &AircraftCheck) -> ExitCode {
 /// # Errors
 /// If the aircraft cannot be trimmed or stabilised at its cruise airspeed.
 pub fn page(file: &Path, model: &GreyBox) -> Result<String> {
+    let found = aircraft_check::check(model)?;
     let report = AircraftReport {
         model,
-        check: &aircraft_check::check(model)?,
+        check: &found,
         responses: &stick_responses(model)?,
         model_file: file.display().to_string(),
+        fitted: is_fitted(file),
+        next: next(file, model, &found),
         command_line: files::command_line(),
     };
     Ok(report.page().render())
+}
+
+/// The command to run next: a flight with the recommended controller in the simulator, or the check again if something should
+/// be corrected. The simulator flies the X8; other aircraft fly in their own model. Empty in a build without simulator.
+fn next(file: &Path, model: &GreyBox, found: &AircraftCheck) -> String {
+    let file = quoted(file);
+    let flown = format!("--controller {} --model {file}", found.controller.name);
+    match found.findings.is_empty() {
+        false => format!("greylag aircraft check --model {file}"),
+        true if !cfg!(feature = "demo") => String::new(),
+        true if model.airframe.name == SIMULATED => format!("greylag demo {flown}"),
+        true => format!("greylag evaluate {flown} --draws 20"),
+    }
+}
+
+/// Whether `greylag amend` fitted coefficients in the model file to flights. It notes this in their sources.
+fn is_fitted(file: &Path) -> bool {
+    std::fs::read_to_string(shipped(file)).is_ok_and(|text| text.contains("; fitted to "))
 }
 
 /// Prints trim, modes, control authority and the stability margins of the loops, then what should be corrected.
@@ -112,7 +139,7 @@ pub fn print(found: &AircraftCheck) {
         1e3 * controller.delay_s
     );
     match found.findings.is_empty() {
-        true => println!("nothing to correct"),
+        true => println!("nothing to correct by its own numbers; no flight was compared"),
         false => found.findings.iter().for_each(|finding| println!("correct: {finding}")),
     }
 }

@@ -48,7 +48,7 @@ pub(super) fn over_draws(
     let flown = entrants(arguments, models)?.iter().map(fly).collect::<Result<Vec<_>>>()?;
     let all: Vec<Evaluation> = flown.iter().map(|r| r.all.clone()).collect();
     if !files::is_stdout(arguments.json.as_deref()) {
-        tables::print(&all);
+        tables::print(&all, arguments.limited());
         println!("{}", draws_table(&flown));
         println!("flown in draws of model {} from the widths of its coefficients", models[0].name);
         println!("intervals assume independent flights; the second table shows how draws differ");

@@ -31,8 +31,8 @@ const SHOWN: [&str; 13] = [
     "outside_s",
 ];
 
-/// Prints the tables, the definitions of their terms, and the conclusion.
-pub(super) fn print(evaluations: &[Evaluation]) {
+/// Prints the tables, the definitions of their terms, and the conclusion. `limited` states that the envelope limiter was used.
+pub(super) fn print(evaluations: &[Evaluation], limited: bool) {
     tables(evaluations).iter().for_each(|table| println!("{table}"));
     if let Some(model) = evaluation_model(evaluations) {
         println!("{}", broken(&format!("model of all controllers that need one: {model}")));
@@ -46,7 +46,8 @@ pub(super) fn print(evaluations: &[Evaluation]) {
     println!("load factor and α kept: at most 5 % beyond the limits of the airframe file");
     // printed last, because a user sees the end of the output first
     println!();
-    evaluation_answer(evaluations).iter().for_each(|sentence| println!("{}", broken(sentence)));
+    let said = evaluation_answer(evaluations, limited);
+    said.iter().for_each(|sentence| println!("{}", broken(sentence)));
 }
 
 pub(super) fn tables(evaluations: &[Evaluation]) -> Vec<Table> {

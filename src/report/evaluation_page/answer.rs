@@ -1,7 +1,8 @@
 //! Sentences of an evaluation's answer: the best controller, its worst target, the other controllers, lost targets.
 
-use super::label;
+use super::{excess, label};
 use crate::kit::numbers::{attitude, number};
+use greylag_sim::Group;
 use greylag_sim::evaluation::{Evaluation, Score};
 
 /// The limits that count as the envelope here, of a controller that keeps them and of one that does not.
@@ -33,14 +34,15 @@ fn ranked<'a>(evaluations: &'a [Evaluation], group: &str) -> [Vec<Ranked<'a>>; 2
     [keeping, leaving]
 }
 
-/// The sentences of the answer: the best controller, its worst target, the other controllers, lost targets. Empty if there are
-/// no scores.
-pub fn sentences(evaluations: &[Evaluation]) -> Vec<String> {
+/// The sentences of the answer: the best controller, flights outside the limits, the worst target of the best, the other
+/// controllers, lost targets. Empty if there are no scores. `limited` states that the envelope limiter was used.
+pub fn sentences(evaluations: &[Evaluation], limited: bool) -> Vec<String> {
     let Some(group) = ranked_over(evaluations) else { return Vec::new() };
     let [keeping, leaving] = ranked(evaluations, &group);
     let Some((best, rest)) = keeping.split_first() else { return Vec::new() };
     let ranked = [&keeping[..], &leaving[..]].concat();
     let mut all = vec![leader(evaluations, *best, ranked.len() == 1)];
+    all.push(excess::sentence(ranked.iter().map(|(e, _)| *e), evaluations, limited));
     all.extend(worst_target(best.0));
     all.extend(followers(evaluations, *best, rest, &leaving));
     all.push(match ranked.iter().all(|(_, s)| s.divergence_rate == 0.0) {
@@ -66,13 +68,17 @@ fn ranked_over(evaluations: &[Evaluation]) -> Option<String> {
 fn leader(all: &[Evaluation], (best, score): Ranked, alone: bool) -> String {
     let name = label(best, all);
     let begin = if alone { name } else { format!("Best: {name}. It") };
+    let without = match left_out(best, score).as_slice() {
+        [] => String::new(),
+        groups => format!(" (ranked without {})", groups.join(" and ")),
+    };
     let flights = match score.count {
-        1 => "1 flight".into(),
-        n => format!("{n} flights"),
+        1 => format!("1 flight{without}"),
+        n => format!("{n} flights{without}"),
     };
     let envelope = match outside(score) {
         None => String::new(),
-        Some(0) if score.count == 1 => format!("{KEEPS} and "),
+        Some(0) if score.count == 1 => format!("{KEEPS}{without} and "),
         Some(0) => format!("{KEEPS} in all {flights} and "),
         Some(left) => format!("{KEEPS} in {} of {flights} and ", score.count - left),
     };
@@ -82,6 +88,16 @@ fn leader(all: &[Evaluation], (best, score): Ranked, alone: bool) -> String {
         "{begin} {envelope}settles on average{over} within {}° of the command (95 %: {low} to {high}°).",
         number(score.mean_deg)
     )
+}
+
+/// Names of the groups that were flown and are not part of the group of `score`.
+fn left_out<'a>(e: &'a Evaluation, score: &Score) -> Vec<&'a str> {
+    let parts = [Group::Easy, Group::HardCorners].map(Group::name);
+    let is_part = |name: &str| match score.targets.as_str() {
+        ALL => name == ALL || parts.contains(&name),
+        group => name == group,
+    };
+    e.groups.iter().map(|s| s.targets.as_str()).filter(|name| !is_part(name)).collect()
 }
 
 /// Number of flights of a group that left the envelope; `None` if this was not measured.

@@ -67,7 +67,7 @@ pub enum Outcome {
 pub struct Verdict {
     /// Outcome, shown as a word and by colour.
     pub outcome: Outcome,
-    /// The requirements that were missed, shown next to the outcome; empty if the sentence states them.
+    /// The requirements that were missed, or what the outcome rests on, shown next to the outcome; empty if the sentence states them.
     pub reason: String,
     /// The verdict as one sentence.
     pub sentence: String,
@@ -92,7 +92,11 @@ impl Verdict {
         let details: String =
             self.details.iter().map(|d| format!("<li>{}</li>", escape(d))).collect();
         let list = if details.is_empty() { details } else { format!("<ul>{details}</ul>") };
-        let joint = if self.outcome == Outcome::Late { ", but " } else { ": " };
+        let joint = match self.outcome {
+            Outcome::Late => ", but ",
+            Outcome::Sound => " ",
+            _ => ": ",
+        };
         let reason = match self.reason.is_empty() {
             true => String::new(),
             false => format!("{joint}{}", escape(&self.reason)),

@@ -21,7 +21,7 @@ export function model(bench) {
     el("button", { type: "button", id: "save", class: stack.length && !unfitted ? "main" : "", disabled: !stack.length || unfitted || state.jobs.length > 0, onclick: () => save(bench) }, "Save"),
     el("button", { type: "button", id: "fly-it", onclick: () => bench.show("fly") }, "Fly it"));
   body.replaceChildren(...[outside, base, box(state), errors(state), ...stack.map((s) => step(bench, s)), next(state) ?? (!stack.length && el("p", { class: "empty" }, nothing(bench.diagnosis))),
-    buttons, saved.note, opened(state), command(state.commands.amend, "Model and Save"), command(state.commands.judge, "Judge")].filter(Boolean));
+    then(state, tests), buttons, saved.note, opened(state), command(state.commands.amend, "Model and Save"), command(state.commands.judge, "Judge")].filter(Boolean));
 }
 
 /** Text in place of the accepted effects. */
@@ -44,6 +44,15 @@ function next(state) {
   const fall = (a, b) => `${show(a)} → ${show(b)} (${percent(b / a - 1)})`;
   const tuning = all.length === 3 && `tuning alone ${fall(all[0][1], all[1][1])}; `;
   return el("p", { id: "ahead" }, `Error${horizon(story.after)} held out: ${tuning || ""}with ${id} (not yet added) ${fall(from, to)}. Tick it to add it.`);
+}
+
+/** The next step with a fitted model: what Judge and Save do. Null before the fit, if the fit refuses an effect, and after Save. */
+function then(state, tests) {
+  const ids = joined(verdicts(state));
+  if (!ids.length || saved.note || state.jobs.length || state.stack.some((s) => !s.story || !ids.includes(s.id))) return null;
+  const last = state.openings.filter((o) => o.occasion === "judged").pop();
+  const judge = tests.length > 0 && last?.effects.join() !== ids.join();
+  return el("p", { id: "then" }, `Next: ${judge ? "Judge measures the error on the test flights, which no fit has used; then " : ""}Save writes the model to a file.`);
 }
 
 /** The answer in the words of the command `amend`. */

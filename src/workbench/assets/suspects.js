@@ -21,7 +21,7 @@ export function suspects(bench) {
     return body.replaceChildren(el("div", { class: "row" }, ask), ...[said, hint, running && first(running)].filter(Boolean), ...end);
   }
   // an unchanged list is not rebuilt, so that plots and keyboard focus are kept
-  const now = JSON.stringify([state.diagnosis.key, state.diagnosis.behind, state.stack.map((s) => [s.id, s.status]), state.commands.diagnose, state.jobs.length > 0]);
+  const now = JSON.stringify([state.diagnosis.key, state.diagnosis.behind, state.stack.map((s) => [s.id, s.status]), tested(state), state.commands.diagnose, state.jobs.length > 0]);
   if (now === before) return;
   before = now;
   const pane = document.querySelector("#suspects .body");
@@ -56,8 +56,9 @@ function missing(found) {
   const other = found.indistinguishable_from.length ? ` (or ${found.indistinguishable_from.join(", ")})` : "";
   return `Missing: ${found.id}${other}${where}. Next: tick it.`;
 }
-/** The next step after a diagnosis that leaves no effect to accept; null if there is none. */
+/** The next step if no effect is left to accept; null if there is none. */
 function next(bench, diagnosis) {
+  if (bench.state.stack.length) return `Next, in the pane Model: ${tested(bench.state) ? "judge it on the test flights, then save it" : "save it"}.`;
   const fitted = bench.state.flights.filter((f) => f.role === "fit" && !f.error);
   const alone = diagnosis.verdict === "unknown" && fitted.length === 1;
   return alone ? "Next: drop more flights into the pane Flights, then Diagnose again." : null;
@@ -65,6 +66,13 @@ function next(bench, diagnosis) {
 function more(summary, children, id = summary) {
   if (!children.length) return "";
   return el("details", { open: open.has(id), ontoggle: (e) => { e.target.open ? open.add(id) : open.delete(id); } }, el("summary", {}, summary), children);
+}
+/** Whether there are test flights to judge the model on. */
+const tested = (state) => state.flights.some((f) => f.role === "test" && !f.error);
+/** Why an effect above chance is neither asserted nor refused: only the strongest suspect of each round is checked. */
+function unchecked(diagnosis) {
+  const found = diagnosis.effects.filter((e) => e.asserted).map((e) => e.id);
+  return `Above chance, but not asserted: ${found.length ? `with ${found.join(" and ")} in the model, ` : ""}it was not the strongest suspect left, and only that one is checked.`;
 }
 const ticked = (bench, id) => bench.state.stack.some((s) => s.id === id);
 
@@ -76,7 +84,8 @@ function suspect(bench, e, most) {
   const box = el("input", { type: "checkbox", checked: on, disabled: fixed, "data-effect": e.id, title: fixed ? "Take back the effects accepted after it first" : "",
     onchange: () => bench.act(on ? { do: "undo" } : { do: "tick", effect: e.id }).then((done) => { if (!done) box.checked = on; }) });
   const above = e.evidence > e.threshold;
-  const tag = e.asserted ? el("span", { class: "tag" }, "asserted") : above && e.refused.length ? el("span", { class: "tag bad" }, "refused") : null;
+  const untold = above && !e.asserted && !e.refused.length && !on;
+  const tag = e.asserted ? el("span", { class: "tag" }, "asserted") : above && e.refused.length ? el("span", { class: "tag bad" }, "refused") : untold ? el("span", { class: "tag" }, "not asserted") : null;
   const log = (v) => 100 * Math.log10(1 + Math.max(0, v)) / Math.log10(1 + most);
   const facts = [decisive(e)];
   if (e.heldout_error_reduction != null) facts.push(`explains ${percent(e.heldout_error_reduction)} of what tuning leaves there (squares, on segments not fitted)`);
@@ -91,6 +100,7 @@ function suspect(bench, e, most) {
     el("div", { class: "meter", role: "img", "aria-label": `evidence ${show(e.evidence)}, chance reaches ${show(e.threshold)}`, title: `evidence ${show(e.evidence)}; chance reaches ${show(e.threshold)} (log scale)` },
       el("i", { vars: { width: `${log(e.evidence)}%` } }), el("b", { vars: { left: `${log(e.threshold)}%` } })),
     ...e.refused.map((why) => el("p", { class: "bad" }, why)),
+    untold && el("p", {}, unchecked(bench.diagnosis)),
     e.indistinguishable_from.length ? el("p", {}, "These flights cannot tell it from ", el("b", {}, e.indistinguishable_from.join(", ")), ".") : "",
     e.indistinguishable_from.length ? el("div", { class: "row" }, e.indistinguishable_from.map((other) => apart(bench, [e.id, other]))) : "",
     more("Do the flights agree?", agreement(e), `agree-${e.id}`));
