@@ -73,11 +73,11 @@ const WITH_RESIDUAL: &str = "The model has a learned residual, which was fitted 
                              model without it (its prior), and the residual is then learned again.";
 
 /// Note on free runs for which the delay of the recorded deflections is removed.
-const CORRECTED: &str = "The errors of free runs are computed with the delay of the recorded actuators corrected, as `compare` does.";
+const CORRECTED: &str = "Only for the errors of free runs, the delay of the recorded actuators is removed, as `compare` does.";
 
 /// Note on free runs with the recorded deflections.
-const AS_RECORDED: &str = "The errors of free runs are computed with the actuators as recorded, because an asserted effect explains \
-                           why they come late: `compare --recorded-clock` gives the same.";
+const AS_RECORDED: &str = "The errors of free runs are computed with the actuators as recorded, because an effect explains why they \
+                           come late: `compare --recorded-clock` gives the same.";
 
 /// Reads the logs, reconstructs the flights and diagnoses the model. Prints sentences and tables, and writes JSON and report.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
@@ -107,7 +107,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     notes.extend(model.residual.as_ref().map(|_| WITH_RESIDUAL.to_owned()));
     notes.append(&mut diagnosis.notes);
     diagnosis.notes = notes;
-    let flights = clocked(flights, &mut diagnosis);
+    let flights = clocked(flights, &model, &mut diagnosis);
     let Diagnosed { tuned, answer } = diagnosed(&model, &flights, &diagnosis)?;
     let words = file_words(&arguments.effects)?;
     let next = next::next(arguments, &model, &diagnosis, &words, &answer);
@@ -143,12 +143,16 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 
 /// The flights of `diagnosis`, which used the recorded deflections, on the time base on which `compare` computes free runs. If a
 /// delay of the deflections is significant, a note of the diagnosis states what becomes of it.
-fn clocked(flights: Vec<Reconstruction>, diagnosis: &mut Diagnosis) -> Vec<Reconstruction> {
+fn clocked(
+    flights: Vec<Reconstruction>,
+    model: &GreyBox,
+    diagnosis: &mut Diagnosis,
+) -> Vec<Reconstruction> {
     if flights.iter().all(|flight| flight.actuators_late().is_none()) {
         return flights;
     }
-    let asserted = diagnosis.effects.iter().filter(|c| c.asserted);
-    let clock = ActuatorClock::beside(asserted.map(|c| c.id.as_str()));
+    let asserted = diagnosis.effects.iter().filter(|c| c.asserted).map(|c| c.id.as_str());
+    let clock = ActuatorClock::beside(asserted.chain(model.effects().map(|about| about.id)));
     let (flights, note) = match clock {
         ActuatorClock::Estimated => {
             (flights.into_iter().map(Reconstruction::with_corrected_clock).collect(), CORRECTED)

@@ -96,14 +96,17 @@ pub fn page(file: &Path, model: &GreyBox) -> Result<String> {
 }
 
 /// The command to run next: a flight with the recommended controller in the simulator, or the check again if something should
-/// be corrected. The simulator flies the X8; other aircraft fly in their own model. Empty in a build without simulator.
-fn next(file: &Path, model: &GreyBox, found: &AircraftCheck) -> String {
-    let file = quoted(file);
+/// be corrected. The simulator flies the X8 without the effects that a fit may have added: other aircraft and fitted models fly
+/// in their own model. Empty in a build without simulator.
+fn next(path: &Path, model: &GreyBox, found: &AircraftCheck) -> String {
+    let file = quoted(path);
     let flown = format!("--controller {} --model {file}", found.controller.name);
     match found.findings.is_empty() {
         false => format!("greylag aircraft check --model {file}"),
         true if !cfg!(feature = "demo") => String::new(),
-        true if model.airframe.name == SIMULATED => format!("greylag demo {flown}"),
+        true if model.airframe.name == SIMULATED && !is_fitted(path) => {
+            format!("greylag demo {flown}")
+        }
         true => format!("greylag evaluate {flown} --draws 20"),
     }
 }

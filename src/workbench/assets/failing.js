@@ -176,22 +176,28 @@ function pressed_cell() {
     brush();
   }
 }
-/** Chooses the channel and the variable in which an effect acts, so that the plots show the accepted effect. */
+/** The cell in which an effect acts: of its channels, the one that the model explains least; the variable of its curve, else the one
+ *  that explains most there. Null if there is none. */
+function cell_of(effect, channels) {
+  const own = channels.filter((c) => effect.channels.includes(c.channel));
+  const channel = own.sort((a, b) => (b.unexplained_fraction ?? 0) - (a.unexplained_fraction ?? 0))[0];
+  const usable = channel?.bins.filter((b) => VARIABLES.includes(b.variable)) ?? [];
+  const drawn = effect.curve?.channel === channel?.channel ? usable.find((b) => effect.curve?.variable.startsWith(b.name)) : null;
+  const variable = drawn ?? usable.sort((a, b) => b.explained - a.explained)[0];
+  return variable ? { channel: channel.channel, variable: variable.variable } : null;
+}
+/** Chooses the cell in which an effect acts, so that the plots show the accepted effect. */
 export function follow(effect) {
   const channels = bench?.failing && models()[0].channels;
-  const channel = effect && channels?.find((c) => c.channel === acts_in(effect));
-  if (!channel) return;
-  const named = channel.bins.find((b) => VARIABLES.includes(b.variable) && effect.curve?.variable.startsWith(b.name));
-  Object.assign(pick, { channel: channel.channel, variable: named?.variable ?? pick.variable, by_hand: true });
+  const cell = effect && channels && cell_of(effect, channels);
+  if (cell) Object.assign(pick, { ...cell, by_hand: true });
 }
 /** Initial choice: the cell in which an asserted effect acts, else the cell that explains most of the residual. */
 function start(channels) {
-  const found = way(bench.failing.ways) === "tuned" ? bench.diagnosis?.effects.find((e) => e.asserted && acts_in(e)) : null;
-  const channel = found && channels.find((c) => c.channel === acts_in(found));
-  const usable = channel?.bins.filter((b) => VARIABLES.includes(b.variable)) ?? [];
-  const named = usable.find((b) => found.curve?.variable.startsWith(b.name)) ?? usable.sort((a, b) => b.explained - a.explained)[0];
-  if (named) {
-    Object.assign(pick, { channel: channel.channel, variable: named.variable });
+  const found = way(bench.failing.ways) === "tuned" ? bench.diagnosis?.effects.find((e) => e.asserted && e.channels.length) : null;
+  const cell = found && cell_of(found, channels);
+  if (cell) {
+    Object.assign(pick, cell);
     return;
   }
   let best = -1;
@@ -201,8 +207,6 @@ function start(channels) {
       if (weight > best) [best, pick.channel, pick.variable] = [weight, c.channel, b.variable];
     }
 }
-/** Channel in which an effect acts most visibly; undefined if it acts in none. */
-const acts_in = (effect) => effect.curve?.channel ?? effect.channels[0];
 const chosen = (model) => model?.channels.find((c) => c.channel === pick.channel);
 const over = (channel) => channel?.bins.find((b) => b.variable === pick.variable);
 /** The bin with the largest mean residual of the model without effects. */
@@ -228,9 +232,10 @@ function of_cell(channel, variable, bin) {
   // half width of the 95 % interval on the side of zero
   const half = bin.mean > 0 ? bin.mean - low : high - bin.mean;
   const error = `${show(Math.abs(bin.mean))}${half > 0 ? ` ± ${show(half, 2)}` : ""} ${channel.unit} ${bin.mean < 0 ? "below" : "above"} the model on average`;
+  const beyond = variable.bins.some((b) => !b.supported && Math.abs(b.mean) > Math.abs(bin.mean));
   const unclear = low <= 0 && high >= 0 ? ", not clearly different from zero" : "";
   return `${channel.name} over ${variable.name}: ${percent(variable.explained)} of the residual's variance goes with it. `
-    + `Largest error at ${variable.name} ${range(bin, variable.unit)}: measured ${error}${unclear}${bin.supported ? "" : ", from few samples"}.`;
+    + `Largest ${bin.supported && beyond ? "well-sampled " : ""}error at ${variable.name} ${range(bin, variable.unit)}: measured ${error}${unclear}${bin.supported ? "" : ", from few samples"}.`;
 }
 /** The range of a bin with its unit, such as "8 to 11°" or "above 0.6". An end that is null is open. */
 function range(bin, unit) {

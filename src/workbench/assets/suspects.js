@@ -58,7 +58,7 @@ function missing(found) {
 }
 /** The next step if no effect is left to accept; null if there is none. */
 function next(bench, diagnosis) {
-  if (bench.state.stack.length) return `Next, in the pane Model: ${tested(bench.state) ? "judge it on the test flights, then save it" : "save it"}.`;
+  if (bench.state.stack.length) return `Next, in the pane Model: ${tested(bench.state) ? "judge it on the test flights, then save it" : "save it, then fly it or compare it on further logs"}.`;
   const fitted = bench.state.flights.filter((f) => f.role === "fit" && !f.error);
   const alone = diagnosis.verdict === "unknown" && fitted.length === 1;
   return alone ? "Next: drop more flights into the pane Flights, then Diagnose again." : null;
