@@ -16,6 +16,7 @@ use std::ops::Range;
 
 use super::finding::Finding;
 use super::format::MAVLINK_MARKERS;
+use super::mapping::telemetry::PX4;
 use super::stretches::Keep;
 use super::topics::{MOST_FLIGHTS, Naming, Topic, Topics, too_many};
 use super::window::Window;
@@ -36,9 +37,8 @@ const VEHICLE: usize = 50;
 /// Number of successive messages that show a restart. A single message may be late or wrong.
 const BACK_FOR: usize = 5;
 
-/// Index of the field `autopilot` among the values of a HEARTBEAT, and its value (MAV_AUTOPILOT) for PX4.
+/// Index of the field `autopilot` among the values of a HEARTBEAT.
 const AUTOPILOT: usize = 1;
-const PX4: f64 = 12.0;
 
 /// A message whose time is not yet computed.
 struct Entry {

@@ -20,9 +20,6 @@ use crate::model::GreyBox;
 use crate::model::modes::Mode;
 use crate::report::AircraftReport;
 
-/// Name of the airframe that `greylag demo` flies by default.
-const SIMULATED: &str = "Skywalker X8";
-
 /// Options of `greylag aircraft check`.
 #[derive(clap::Args)]
 pub struct Arguments {
@@ -62,7 +59,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             model.airframe.reference.altitude
         );
         print(&found);
-        print_next(&next(&arguments.model, &model, &found));
+        print_next(&next(&arguments.model, &found));
     }
     let document = Document { model: &model.name, airframe: &model.airframe.name, found: &found };
     arguments.json.write("greylag.aircraft-check/1", &document, Overwrite::New)?;
@@ -89,25 +86,25 @@ pub fn page(file: &Path, model: &GreyBox) -> Result<String> {
         responses: &stick_responses(model)?,
         model_file: file.display().to_string(),
         fitted: is_fitted(file),
-        next: next(file, model, &found),
+        next: next(file, &found),
         command_line: files::command_line(),
     };
     Ok(report.page().render())
 }
 
-/// The command to run next: a flight with the recommended controller in the simulator, or the check again if something should
-/// be corrected. The simulator flies the X8 without the effects that a fit may have added: other aircraft and fitted models fly
-/// in their own model. Empty in a build without simulator.
-fn next(path: &Path, model: &GreyBox, found: &AircraftCheck) -> String {
-    let file = quoted(path);
-    let flown = format!("--controller {} --model {file}", found.controller.name);
+/// The command to run next: flights of the recommended controller in the model itself, with drawn coefficients, or the check again
+/// if something should be corrected. Empty in a build that cannot fly.
+fn next(file: &Path, found: &AircraftCheck) -> String {
+    let file = quoted(file);
     match found.findings.is_empty() {
         false => format!("greylag aircraft check --model {file}"),
         true if !cfg!(feature = "demo") => String::new(),
-        true if model.airframe.name == SIMULATED && !is_fitted(path) => {
-            format!("greylag demo {flown}")
+        true => {
+            format!(
+                "greylag evaluate --controller {} --model {file} --draws 20",
+                found.controller.name
+            )
         }
-        true => format!("greylag evaluate {flown} --draws 20"),
     }
 }
 

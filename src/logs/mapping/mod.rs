@@ -25,7 +25,7 @@
 mod ardupilot;
 mod board;
 mod mavros;
-mod telemetry;
+pub(crate) mod telemetry;
 mod px4;
 pub(super) mod rule;
 mod servos;

@@ -30,8 +30,10 @@ pub const TOPICS: [&str; 16] = [
     "WIND_COV",
 ];
 
+/// MAV_AUTOPILOT number of PX4.
+pub(crate) const PX4: f64 = 12.0;
 /// MAV_AUTOPILOT numbers of ArduPilot and PX4, whose VFR_HUD has equivalent airspeed.
-const EQUIVALENT: [f64; 2] = [3.0, 12.0];
+const EQUIVALENT: [f64; 2] = [3.0, PX4];
 /// One milli-g in m/s².
 const MILLI_G: f64 = STANDARD_GRAVITY / 1000.0;
 /// Deflection of the simulator's X8 at a normalised position of 1, rad.

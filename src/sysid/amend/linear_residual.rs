@@ -195,51 +195,16 @@ impl Sums {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flight_path::reconstruction::{Instant, Reconstruction, Segment};
-
-    fn model() -> GreyBox {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../params/x8/jsbsim.toml");
-        GreyBox::load(std::path::Path::new(path)).unwrap()
-    }
+    use crate::amend::sample;
 
     /// A flight of 20 s of `model` with sinusoidal deflections.
     fn flown(model: &GreyBox, name: &str, phase: f64) -> Prepared {
-        let mut state = State { airspeed: 18.0, alpha: 0.05, pitch: 0.05, ..State::NEUTRAL };
-        let mut memory = Memory::default();
-        let instants = (0..2000).map(|k| {
-            let t = 0.01 * k as f64 + phase;
-            let controls = Controls {
-                aileron: 0.04 * (3.1 * t).sin(),
-                elevator: -0.03 + 0.03 * (2.3 * t).cos(),
-                throttle: 0.5 + 0.2 * (0.7 * t).sin(),
-                ..Controls::default()
-            };
-            let at = Instant {
-                time_s: 0.01 * k as f64,
-                state,
-                yaw: f64::NAN,
-                controls,
-                command: None,
-                specific_force: [f64::NAN; 3],
-                altitude: 600.0,
-                density: 1.225,
-            };
-            state = model.step(&state, &controls, 600.0, &mut memory);
-            at
-        });
-        let flight = Reconstruction {
-            segments: vec![Segment { instants: instants.collect() }],
-            noise: [1e-3; 8],
-            left: [1e-3; 8],
-            force_noise: [0.1; 3],
-            ..Reconstruction::empty(name)
-        };
-        Prepared::new(&flight, 8.0).unwrap()
+        Prepared::new(&sample::flight(model, name, 2000, phase), 8.0).unwrap()
     }
 
     #[test]
     fn a_planted_linear_residual_is_found_and_helps_on_another_flight() {
-        let model = model();
+        let model = sample::model();
         let mut weights = vec![0.0_f32; REGRESSORS * OUTPUTS];
         weights[4 * OUTPUTS + 4] = -0.05; // pitch acceleration with the angle of attack
         weights[INPUTS * OUTPUTS + 3] = 0.004; // a constant roll acceleration
@@ -257,7 +222,7 @@ mod tests {
 
     #[test]
     fn an_exact_model_gets_no_residual() {
-        let model = model();
+        let model = sample::model();
         let parts = [flown(&model, "a", 0.0), flown(&model, "b", 1.0)];
         assert!(fit(&model, &parts, &[1.0, 2.0]).is_none());
         assert!(fit(&model, &parts[..1], &[1.0]).is_none(), "one part leaves none to predict");

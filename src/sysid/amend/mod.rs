@@ -22,6 +22,8 @@ pub mod output_error;
 mod parameters;
 mod quick;
 mod result;
+#[cfg(test)]
+mod sample;
 mod shooting;
 mod story;
 

@@ -1,44 +1,14 @@
 //! The derivatives beside finite differences of whole residuals.
 
 use super::*;
-use crate::flight_path::reconstruction::{Instant, Reconstruction, Segment};
+use crate::amend::sample;
+use crate::flight_path::reconstruction::Reconstruction;
 use greylag_logs::Sampling;
-use greylag_physics::State;
 
 /// A flight of 3 s of `model` with sinusoidal deflections.
 fn flown(model: &GreyBox, sampling: Sampling) -> Flight {
-    let mut state = State { airspeed: 18.0, alpha: 0.05, pitch: 0.05, ..State::NEUTRAL };
-    let mut memory = greylag_model::Memory::default();
-    let instants = (0..301).map(|k| {
-        let t = 0.01 * f64::from(k);
-        let controls = Controls {
-            aileron: 0.04 * (3.1 * t).sin(),
-            elevator: -0.03 + 0.03 * (2.3 * t).cos(),
-            throttle: 0.5 + 0.2 * (0.7 * t).sin(),
-            ..Controls::default()
-        };
-        let at = Instant {
-            time_s: t,
-            state,
-            yaw: f64::NAN,
-            controls,
-            command: None,
-            specific_force: [f64::NAN; 3],
-            altitude: 600.0,
-            density: 1.225,
-        };
-        state = model.step(&state, &controls, 600.0, &mut memory);
-        at
-    });
-    let flight = Reconstruction {
-        sampling,
-        segments: vec![Segment { instants: instants.collect() }],
-        noise: [1e-3; 8],
-        left: [1e-3; 8],
-        force_noise: [0.1; 3],
-        ..Reconstruction::empty("a")
-    };
-    Flight::new(&flight, 8.0).unwrap()
+    let flight = sample::flight(model, "a", 301, 0.0);
+    Flight::new(&Reconstruction { sampling, ..flight }, 8.0).unwrap()
 }
 
 /// Residuals of the second of two shots, after the unknown with number `column` was increased by `by`.
@@ -66,8 +36,7 @@ fn moved(
 
 #[test]
 fn all_columns_agree_with_finite_differences() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../params/x8/jsbsim.toml");
-    let model = GreyBox::load(std::path::Path::new(path)).unwrap();
+    let model = sample::model();
     let asked = PerFlight { trims: Some(1.0), askew_deg: Some(3.0), ..PerFlight::default() };
     let base = crate::per_flight::trims::joined(&model).unwrap();
     let free = parameters::free(&model, &[]);

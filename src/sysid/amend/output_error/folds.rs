@@ -129,10 +129,9 @@ impl<'a> Search<'a> {
 mod tests {
     use super::*;
     use crate::amend::judge::{Judge, judged};
-    use crate::flight_path::reconstruction::{Instant, Reconstruction, Segment};
-    use greylag_model::Memory;
+    use crate::amend::sample;
     use greylag_num::stream::stream;
-    use greylag_physics::{Controls, State};
+    use greylag_physics::State;
     use rand_distr::{Distribution, StandardNormal};
 
     /// Standard deviations of the noise of recorded states, in the units of the state.
@@ -145,48 +144,21 @@ mod tests {
         let damping = 1.1 + 0.03 * (f64::from(number) - 1.5);
         flown.set_coefficient("roll_linear.Clp", damping * of("roll_linear.Clp"));
         flown.set_coefficient("pitch_linear.Cmq", 0.9 * of("pitch_linear.Cmq"));
+        let mut flight =
+            sample::flight(&flown, &format!("{number}"), 1200, 3.0 * f64::from(number));
+        (flight.noise, flight.left) = (NOISE, NOISE);
         let mut random = stream(u64::from(number), &[]);
-        let mut state = State { airspeed: 18.0, alpha: 0.05, pitch: 0.05, ..State::NEUTRAL };
-        let mut memory = Memory::default();
-        let instants = (0..1200).map(|k| {
-            let time_s = 0.01 * f64::from(k);
-            let t = time_s + 3.0 * f64::from(number);
-            let controls = Controls {
-                aileron: 0.04 * (3.1 * t).sin(),
-                elevator: -0.03 + 0.03 * (2.3 * t).cos(),
-                throttle: 0.5 + 0.2 * (0.7 * t).sin(),
-                ..Controls::default()
-            };
-            let mut unit = || -> f64 { StandardNormal.sample(&mut random) };
-            let seen = state.to_array();
-            let seen = std::array::from_fn(|i| seen[i] + NOISE[i] * unit());
-            let at = Instant {
-                time_s,
-                state: State::from_array(seen),
-                yaw: f64::NAN,
-                controls,
-                command: None,
-                specific_force: [f64::NAN; 3],
-                altitude: 600.0,
-                density: 1.225,
-            };
-            state = flown.step(&state, &controls, 600.0, &mut memory);
-            at
-        });
-        let flight = Reconstruction {
-            segments: vec![Segment { instants: instants.collect() }],
-            noise: NOISE,
-            left: NOISE,
-            force_noise: [0.1; 3],
-            ..Reconstruction::empty(&format!("{number}"))
-        };
+        let mut unit = || -> f64 { StandardNormal.sample(&mut random) };
+        for at in &mut flight.segments[0].instants {
+            let state = at.state.to_array();
+            at.state = State::from_array(std::array::from_fn(|i| state[i] + NOISE[i] * unit()));
+        }
         Flight::new(&flight, 8.0).unwrap()
     }
 
     #[test]
     fn a_fit_without_a_flight_predicts_it_like_one_from_the_beginning() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../params/x8/jsbsim.toml");
-        let model = GreyBox::load(std::path::Path::new(path)).unwrap();
+        let model = sample::model();
         let flights: Vec<Flight> = (0..4).map(|number| flown(&model, number)).collect();
         let options = FitOptions::default();
         let all = without_each(&model, &flights, &options, &[0, 1, 2, 3]);

@@ -12,6 +12,7 @@ use crate::diagnose::search::stepwise::Found;
 use crate::per_flight::askew;
 use greylag_model::GreyBox;
 use greylag_physics::catalogue::describe;
+use greylag_physics::inputs::{Kind, MOST};
 
 /// A re-estimated coefficient gets a note if it differs from its value in the model file by more than this number of prior
 /// standard deviations.
@@ -248,10 +249,16 @@ pub fn notes(found: &Found, model: &GreyBox, verdict: Verdict, options: &Options
     if !options.without.is_empty() {
         notes.push(format!("Left out of the catalogue: {}.", options.without.join(", ")));
     }
+    if model.effects().filter(|about| Kind::from_id(about.id).is_some()).count() == MOST {
+        notes.push(format!(
+            "The model has {MOST} effects on the inputs (servos, lags, delays), the most that it can have. No further one was \
+             examined."
+        ));
+    }
     notes
 }
 
-/// Notes on the sensor errors far from what the reconstruction says about them.
+/// Notes on the sensor errors that are far from their estimates in the reconstruction.
 fn sensors_far_off(found: &Found, verdict: Verdict) -> Vec<String> {
     let round = found.round();
     let own = round.per_flight.constants().len() * round.flights.len();
@@ -261,7 +268,7 @@ fn sensors_far_off(found: &Found, verdict: Verdict) -> Vec<String> {
     far.map(|(known, off)| far_off(&known.name, off, verdict)).collect()
 }
 
-/// Note on the sensor error `name`, which is `off` standard deviations from what the reconstruction says about it.
+/// Note on the sensor error `name`, which is `off` standard deviations from its estimate in the reconstruction.
 fn far_off(name: &str, off: f64, verdict: Verdict) -> String {
     let smoothing = name.starts_with(BLUR);
     let what = if smoothing { " (a smoothing of the recorded deflections)" } else { "" };

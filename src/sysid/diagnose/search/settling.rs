@@ -32,6 +32,18 @@ pub struct Ranked {
     pub threshold: f64,
 }
 
+impl Ranked {
+    /// The candidate with the most evidence. It need not rank first.
+    fn strongest(&self) -> Option<&(usize, Score)> {
+        self.scores.iter().max_by(|(_, a), (_, b)| a.evidence.total_cmp(&b.evidence))
+    }
+
+    /// Evidence of that candidate.
+    fn evidence(&self) -> f64 {
+        self.strongest().map_or(0.0, |(_, score)| score.evidence)
+    }
+}
+
 /// Ranks the candidates of `round`. The regressors of mass and inertia contain accelerations that the model predicts.
 /// If these accelerations are too inaccurate, the ranking is repeated with the accelerations of a better model.
 pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
@@ -43,10 +55,12 @@ pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
     };
     let mut ranked = rank(round);
     for _ in 0..RELINEARISATIONS {
-        match beside_the_strongest(problem, &ranked) {
-            Some(round) => ranked = rank(round),
-            None => break,
+        let Some(round) = beside_the_strongest(problem, &ranked) else { break };
+        let next = rank(round);
+        if next.evidence() <= ranked.evidence() {
+            break;
         }
+        ranked = next;
     }
     match accelerated(problem, &ranked) {
         Some(round) => rank(round),
@@ -57,13 +71,12 @@ pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
 /// Linearises the model again with its coefficients from the joint fit with the candidate of the most evidence, if that
 /// candidate ended at a physical bound. `None` otherwise.
 ///
-/// Without the effect, a regression can shrink all coefficients of a channel: of a moment that nearly balances the damping,
-/// the regressors then explain the inertia's small share worst. A column of a control, the derivative times the deflection,
-/// shrinks with them, and its gain would have to be beyond its bound.
+/// Moments of control and damping nearly balance, so that only the small angular acceleration determines the scale of the
+/// coefficients. A missing moment that is larger shrinks them all (attenuation). The regressor of an effect on a control contains
+/// the control derivative and shrinks with it, so that its constant would have to exceed its bound.
 fn beside_the_strongest(problem: &Problem, ranked: &Ranked) -> Option<Round> {
-    let Ranked { round, scores, threshold, .. } = ranked;
-    let (trial, score) =
-        scores.iter().max_by(|(_, a), (_, b)| a.evidence.total_cmp(&b.evidence))?;
+    let Ranked { round, threshold, .. } = ranked;
+    let (trial, score) = ranked.strongest()?;
     let bounded = score.evidence > *threshold && round.at_bound(*trial, score);
     bounded.then(|| Round::new(problem, round.with(score), &round.entries)).flatten()
 }
