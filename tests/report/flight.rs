@@ -185,6 +185,22 @@ fn the_first_sentence_says_how_the_envelope_was_kept() {
     assert_eq!(outcome == Outcome::Missed, report.tracked() < all);
     let html = report.page().render();
     assert!(html.contains("Integral of error (° s)") && html.contains("2.90"));
+
+    // all targets are reached, outside a limit that the outcome does not count: one line says both
+    report.segments = vec![settled(Difficulty::Easy, 0.02); 3];
+    report.envelope = Some(EnvelopeFlown {
+        limits: greylag::control::quality::Limits {
+            load_factor: [-1.0, 3.5],
+            pitch_deg: [-90.0, -89.0],
+            ..limits
+        },
+        flying_from_mps: 6.0,
+    });
+    let (outcome, sentence) = verdict(&report);
+    assert_eq!(outcome, Outcome::Reached);
+    assert!(sentence.starts_with("Reached all 3 targets; outside limits for "), "{sentence}");
+    let html = report.page().render();
+    assert!(html.contains(">Reached all 3 targets; outside the limit of pitch for "), "{sentence}");
 }
 
 #[test]

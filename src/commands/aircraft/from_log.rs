@@ -10,9 +10,9 @@ use super::check;
 use super::new::{self, Common};
 use crate::commands::files::{self, Overwrite};
 use crate::commands::intake::LogArguments;
+use crate::commands::terminal::print_next;
 use crate::commands::{Command, command_of, given};
 use crate::logs::quoted;
-use crate::model::GreyBox;
 
 /// Largest ratio of standard deviation to magnitude at which a coefficient counts as determined.
 const KNOWN: f64 = 0.3;
@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let found = check::page(&fitted, &given::model(&fitted)?)?;
     files::write(&page, &found, Overwrite::New)?;
     println!("wrote {} and {}", page.display(), folder.join("fit.html").display());
-    next(folder, &fitted)?;
+    next(folder, &fitted, logs)?;
     Ok(status)
 }
 
@@ -93,8 +93,9 @@ fn remove(folder: &Path, prior: &Path, made: [bool; 2]) {
     };
 }
 
-/// Prints manoeuvres for the coefficients that the flights do not determine, and the next command.
-fn next(folder: &Path, fitted: &Path) -> Result<()> {
+/// Prints manoeuvres for the coefficients that the flights do not determine, and the next command: a diagnosis of the model
+/// `fitted` on the fitted `logs`.
+fn next(folder: &Path, fitted: &Path, logs: &LogArguments) -> Result<()> {
     let text = std::fs::read_to_string(folder.join("amend.json"))?;
     let story: serde_json::Value = serde_json::from_str(&text)?;
     let unknown = unknown(&story);
@@ -118,12 +119,8 @@ fn next(folder: &Path, fitted: &Path) -> Result<()> {
             );
         }),
     }
-    let model = GreyBox::load(fitted)?;
-    println!(
-        "{}: next: greylag compare --model {} --log ANOTHER_FLIGHT",
-        model.name,
-        quoted(fitted)
-    );
+    println!("a flight that the fit has not seen judges the model: `greylag compare` with its log");
+    print_next(&format!("greylag diagnose --model {}{}", quoted(fitted), logs.words()));
     Ok(())
 }
 

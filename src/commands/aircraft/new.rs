@@ -87,8 +87,7 @@ pub fn write(folder: &Path, airframe: &str, model_text: &str) -> Result<ExitCode
     let found = aircraft_check::check(&GreyBox::load(&model)?)?;
     super::check::print(&found);
     println!(
-        "fly it, then fit it (FLIGHTS: the logs of its flights; FOLDER: a new folder): greylag amend --model {} --log \
-         FLIGHTS --tune-only --out FOLDER",
+        "next: fly it and fit {} to the logs of its flights, by `greylag amend` with --tune-only and a new folder",
         quoted(&model)
     );
     Ok(super::check::status(&found))

@@ -55,19 +55,59 @@ pub struct OutsideS {
     pub any: f64,
 }
 
+/// A limit of the flight envelope.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Limit {
+    /// Largest bank.
+    Bank,
+    /// Smallest or largest pitch.
+    Pitch,
+    /// Largest load factor.
+    LoadFactor,
+    /// Smallest load factor.
+    LeastLoadFactor,
+    /// Stall angle of attack.
+    Stall,
+    /// Largest sideslip.
+    Sideslip,
+    /// Smallest airspeed.
+    LeastAirspeed,
+    /// Largest airspeed.
+    LargestAirspeed,
+    /// Largest rate of a surface command.
+    SurfaceRate,
+}
+
+impl Limit {
+    /// Name in sentences.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Limit::Bank => "bank",
+            Limit::Pitch => "pitch",
+            Limit::LoadFactor => "load factor",
+            Limit::LeastLoadFactor => "least load factor",
+            Limit::Stall => "stall",
+            Limit::Sideslip => "sideslip",
+            Limit::LeastAirspeed => "least airspeed",
+            Limit::LargestAirspeed => "largest airspeed",
+            Limit::SurfaceRate => "surface rate",
+        }
+    }
+}
+
 impl OutsideS {
-    /// Names of the exceeded limits, each with the time outside it, s.
-    pub fn passed(&self) -> Vec<(&'static str, f64)> {
+    /// The exceeded limits, each with the time outside it, s.
+    pub fn passed(&self) -> Vec<(Limit, f64)> {
         let all = [
-            ("bank", self.bank),
-            ("pitch", self.pitch),
-            ("load factor", self.load_factor),
-            ("least load factor", self.load_factor_low),
-            ("stall", self.stall),
-            ("sideslip", self.sideslip),
-            ("least airspeed", self.slow),
-            ("largest airspeed", self.fast),
-            ("surface rate", self.slew),
+            (Limit::Bank, self.bank),
+            (Limit::Pitch, self.pitch),
+            (Limit::LoadFactor, self.load_factor),
+            (Limit::LeastLoadFactor, self.load_factor_low),
+            (Limit::Stall, self.stall),
+            (Limit::Sideslip, self.sideslip),
+            (Limit::LeastAirspeed, self.slow),
+            (Limit::LargestAirspeed, self.fast),
+            (Limit::SurfaceRate, self.slew),
         ];
         all.into_iter().filter(|(_, seconds)| *seconds > 0.0).collect()
     }

@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::{Observation, Target};
 use greylag_physics::Command;
 
-pub use limits::{Limits, OutsideS, TRANSIENT};
+pub use limits::{Limit, Limits, OutsideS, TRANSIENT};
 pub use measures::{MEASURES, Measure, Worse, measure};
 
 /// Attitude error within which a target counts as reached, degrees.

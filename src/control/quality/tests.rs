@@ -178,7 +178,7 @@ fn every_limit_is_judged_by_its_own_quantity() {
         outside
             .passed()
             .into_iter()
-            .map(|(name, s)| (name, (s * 100.0).round()))
+            .map(|(limit, s)| (limit.name(), (s * 100.0).round()))
             .collect::<Vec<_>>()
     };
     assert_eq!(outside(&|_| ()), []);

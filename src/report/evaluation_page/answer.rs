@@ -1,4 +1,5 @@
-//! Sentences of an evaluation's answer: the best controller, its worst target, the other controllers, lost targets.
+//! Sentences of an evaluation's answer: the controller with the smallest settled error and whether it keeps its limits, its worst
+//! target, the other controllers, lost targets.
 
 use super::{excess, label};
 use crate::kit::numbers::{attitude, number};
@@ -34,14 +35,17 @@ fn ranked<'a>(evaluations: &'a [Evaluation], group: &str) -> [Vec<Ranked<'a>>; 2
     [keeping, leaving]
 }
 
-/// The sentences of the answer: the best controller, flights outside the limits, the worst target of the best, the other
-/// controllers, lost targets. Empty if there are no scores. `limited` states that the envelope limiter was used.
+/// The sentences of the answer: the controller with the smallest settled error and the limits that it keeps, flights outside the
+/// limits, its worst target, the other controllers, lost targets. Empty if there are no scores. `limited` states that the envelope limiter was used.
 pub fn sentences(evaluations: &[Evaluation], limited: bool) -> Vec<String> {
     let Some(group) = ranked_over(evaluations) else { return Vec::new() };
     let [keeping, leaving] = ranked(evaluations, &group);
     let Some((best, rest)) = keeping.split_first() else { return Vec::new() };
     let ranked = [&keeping[..], &leaving[..]].concat();
-    let mut all = vec![leader(evaluations, *best, ranked.len() == 1)];
+    let mut all = vec![match ranked.len() {
+        1 => alone(evaluations, *best),
+        _ => leader(evaluations, *best, &ranked),
+    }];
     all.push(excess::sentence(ranked.iter().map(|(e, _)| *e), evaluations, limited));
     all.extend(worst_target(best.0));
     all.extend(followers(evaluations, *best, rest, &leaving));
@@ -64,30 +68,76 @@ fn ranked_over(evaluations: &[Evaluation]) -> Option<String> {
     Some(all.unwrap_or(most).targets.clone())
 }
 
-/// Sentence on the best controller: envelope and settled error. `alone` states that there is no other controller.
-fn leader(all: &[Evaluation], (best, score): Ranked, alone: bool) -> String {
-    let name = label(best, all);
-    let begin = if alone { name } else { format!("Best: {name}. It") };
-    let without = match left_out(best, score).as_slice() {
-        [] => String::new(),
-        groups => format!(" (ranked without {})", groups.join(" and ")),
-    };
-    let flights = match score.count {
-        1 => format!("1 flight{without}"),
-        n => format!("{n} flights{without}"),
-    };
-    let envelope = match outside(score) {
+/// Sentence on a single controller: its limits and its settled error.
+fn alone(all: &[Evaluation], (only, score): Ranked) -> String {
+    let name = label(only, all);
+    let limits = match outside(score) {
         None => String::new(),
-        Some(0) if score.count == 1 => format!("{KEEPS}{without} and "),
-        Some(0) => format!("{KEEPS} in all {flights} and "),
-        Some(left) => format!("{KEEPS} in {} of {flights} and ", score.count - left),
+        Some(0) if score.count == 1 => format!("{KEEPS}{} and ", without(only, score)),
+        Some(left) => format!("{KEEPS} in {} and ", kept_in(only, score, left)),
     };
-    let over = if envelope.is_empty() { format!(" over {flights}") } else { String::new() };
+    let over = match limits.is_empty() {
+        true => format!(" over {}", flights(only, score)),
+        false => String::new(),
+    };
     let [low, high] = score.mean_ci95_deg.map(number);
     format!(
-        "{begin} {envelope}settles on average{over} within {}° of the command (95 %: {low} to {high}°).",
+        "{name} {limits}settles on average{over} within {}° of the command (95 %: {low} to {high}°).",
         number(score.mean_deg)
     )
+}
+
+/// Sentences on the controller that ranks first among several: its settled error and, separately, its limits. If it leaves them in
+/// any flight, they name the controller of `ranked` with the smallest settled error that keeps them in all flights.
+fn leader(all: &[Evaluation], (best, score): Ranked, ranked: &[Ranked]) -> String {
+    let smaller = ranked.iter().any(|(_, s)| s.mean_deg < score.mean_deg);
+    let of = if smaller { " of those that keep their limits most often" } else { "" };
+    let [low, high] = score.mean_ci95_deg.map(number);
+    let mut said = format!(
+        "Smallest settled error{of}: {}, on average {}° (95 %: {low} to {high}°)",
+        label(best, all),
+        number(score.mean_deg)
+    );
+    let Some(left) = outside(score) else {
+        return format!("{said}, over {}.", flights(best, score));
+    };
+    if left == 0 {
+        return format!("{said}. It {KEEPS} in {}.", kept_in(best, score, 0));
+    }
+    said += &format!(". It is {LEAVES} in {left} of {}", flights(best, score));
+    let keeping = ranked.iter().filter(|(_, s)| outside(s) == Some(0));
+    match keeping.min_by(|(_, a), (_, b)| a.mean_deg.total_cmp(&b.mean_deg)) {
+        Some((e, s)) => {
+            let (name, error) = (label(e, all), number(s.mean_deg));
+            format!("{said}; {name} {KEEPS} in all, with {error}°.")
+        }
+        None => format!("{said}; no controller keeps them in all."),
+    }
+}
+
+/// Phrase for the number of flights of the group of `score`.
+fn flights(e: &Evaluation, score: &Score) -> String {
+    let all = match score.count {
+        1 => "1 flight".to_owned(),
+        n => format!("{n} flights"),
+    };
+    all + &without(e, score)
+}
+
+/// Phrase for the flights in which the limits are kept, if they are left in `left` of them.
+fn kept_in(e: &Evaluation, score: &Score, left: usize) -> String {
+    match left {
+        0 => format!("all {}", flights(e, score)),
+        left => format!("{} of {}", score.count - left, flights(e, score)),
+    }
+}
+
+/// Names in parentheses of the groups that the ranking leaves out; empty if there are none.
+fn without(e: &Evaluation, score: &Score) -> String {
+    match left_out(e, score).as_slice() {
+        [] => String::new(),
+        groups => format!(" (ranked without {})", groups.join(" and ")),
+    }
 }
 
 /// Names of the groups that were flown and are not part of the group of `score`.

@@ -99,7 +99,7 @@ mod tests {
         );
         // the group that the ranking leaves out is named
         let said = answer::sentences(&all, false);
-        assert!(said[0].contains("in all 2 flights (ranked without hard_outside) and"), "{said:?}");
+        assert!(said[0].contains("in all 2 flights (ranked without hard_outside)."), "{said:?}");
         let kept = [flown("lqi", [1.0; 3])];
         assert_eq!(sentence(kept.iter(), &kept, true), "Flown with the envelope limiter.");
     }

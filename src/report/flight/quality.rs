@@ -5,7 +5,7 @@ use crate::flight::{EnvelopeFlown, FlightReport, Segment};
 use crate::kit::numbers::number;
 use crate::{Align, Figure, Row, Section, Table};
 use greylag_control::Target;
-use greylag_control::quality::{Limits, Moment, OutsideS, Quality, Track};
+use greylag_control::quality::{Limit, Limits, Moment, OutsideS, Quality, Track};
 use greylag_logs::Sample;
 use greylag_physics::Command;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
@@ -147,11 +147,8 @@ pub(super) fn outside(kept: &Kept, limits: &Limits) -> String {
         return "inside every limit of the airframe file".to_owned();
     }
     let passed = kept.outside_s.passed();
-    let one = |(name, s): &(&str, f64)| {
-        let what = match reached(name, kept, limits) {
-            Some(text) => text,
-            None => (*name).to_owned(),
-        };
+    let one = |(limit, s): &(Limit, f64)| {
+        let what = reached(*limit, kept, limits).unwrap_or_else(|| limit.name().to_owned());
         match passed.len() {
             1 => what,
             _ => format!("{what}, for {} s", number(*s)),
@@ -161,28 +158,41 @@ pub(super) fn outside(kept: &Kept, limits: &Limits) -> String {
     format!("outside limits for {} s ({})", number(seconds), all.join("; "))
 }
 
-/// The value farthest beyond the limit `name`, a name of [`OutsideS::passed`], and the limit; `None` if the value is unknown.
-fn reached(name: &str, kept: &Kept, limits: &Limits) -> Option<String> {
+/// Phrase with the names of the passed limits and the time outside any of them; `None` if no limit is passed.
+pub(super) fn outside_in_short(kept: &Kept) -> Option<String> {
+    let names: Vec<&str> = kept.outside_s.passed().iter().map(|(limit, _)| limit.name()).collect();
+    let (last, rest) = names.split_last()?;
+    let (of, names) = match rest {
+        [] => ("limit", (*last).to_owned()),
+        rest => ("limits", format!("{} and {last}", rest.join(", "))),
+    };
+    Some(format!("outside the {of} of {names} for {} s", number(kept.outside_s.any)))
+}
+
+/// The value farthest beyond `limit` and the limit, in words; `None` for the rate of the surfaces, whose value is not kept.
+fn reached(limit: Limit, kept: &Kept, limits: &Limits) -> Option<String> {
     let [roll, pitch, sideslip] = kept.angles_deg;
     let farther = |[least, most]: [f64; 2], [low, high]: [f64; 2]| {
         if low - least > most - high { (least, low) } else { (most, high) }
     };
-    let (what, (value, limit), unit) = match name {
-        "bank" => ("roll", farther(roll, [-limits.bank_deg, limits.bank_deg]), "°"),
-        "pitch" => ("pitch", farther(pitch, limits.pitch_deg), "°"),
-        "load factor" => ("load factor", (kept.load_factor[1], limits.load_factor[1]), ""),
-        "least load factor" => ("load factor", (kept.load_factor[0], limits.load_factor[0]), ""),
-        "stall" => ("angle of attack", (kept.alpha_deg, limits.stall_deg), "°"),
-        "sideslip" => {
-            let most = limits.sideslip_deg;
-            ("sideslip", farther(sideslip, [-most, most]), "°")
+    let most_sideslip = limits.sideslip_deg;
+    let (what, (value, end), unit) = match limit {
+        Limit::Bank => ("roll", farther(roll, [-limits.bank_deg, limits.bank_deg]), "°"),
+        Limit::Pitch => ("pitch", farther(pitch, limits.pitch_deg), "°"),
+        Limit::LoadFactor => ("load factor", (kept.load_factor[1], limits.load_factor[1]), ""),
+        Limit::LeastLoadFactor => ("load factor", (kept.load_factor[0], limits.load_factor[0]), ""),
+        Limit::Stall => ("angle of attack", (kept.alpha_deg, limits.stall_deg), "°"),
+        Limit::Sideslip => ("sideslip", farther(sideslip, [-most_sideslip, most_sideslip]), "°"),
+        Limit::LeastAirspeed => {
+            ("airspeed", (kept.airspeed_mps[0], limits.airspeed_mps[0]), " m/s")
         }
-        "least airspeed" => ("airspeed", (kept.airspeed_mps[0], limits.airspeed_mps[0]), " m/s"),
-        "largest airspeed" => ("airspeed", (kept.airspeed_mps[1], limits.airspeed_mps[1]), " m/s"),
-        _ => return None,
+        Limit::LargestAirspeed => {
+            ("airspeed", (kept.airspeed_mps[1], limits.airspeed_mps[1]), " m/s")
+        }
+        Limit::SurfaceRate => return None,
     };
-    let [value, limit] = apart(value, limit);
-    Some(format!("{what} {value}{unit}, limit {limit}{unit}"))
+    let [value, end] = apart(value, end);
+    Some(format!("{what} {value}{unit}, limit {end}{unit}"))
 }
 
 /// Two numbers with the same number of decimals, one or as many more as they need to differ.

@@ -1,7 +1,7 @@
 //! The verdict on a flight: one sentence and the measurements that it is based on. A segment is the part of the flight with one
 //! target.
 
-use crate::flight::quality::{clause, kept, left, loads, most, outside};
+use crate::flight::quality::{clause, kept, left, loads, most, outside, outside_in_short};
 use crate::flight::{Difficulty, FlightReport, Segment};
 use crate::kit::numbers::{attitude, number};
 use crate::{LoopTiming, Outcome, Verdict};
@@ -31,19 +31,22 @@ impl Parts {
         let (tracked, all) = (report.tracked(), report.segments.len());
         let flown = report.envelope.map(|e| (kept(&report.flight.samples, &e), e.limits));
         let left_it = flown.as_ref().filter(|(kept, _)| left(kept));
-        let mut first: Vec<String> =
-            left_it.map(|(kept, limits)| capital(&outside(kept, limits))).into_iter().collect();
-        first.push(match all {
-            0 if left_it.is_some() => {
-                format!("flew {:.1} s without a target", duration_s(&report.flight.samples))
+        let beyond = left_it.map(|(kept, limits)| outside(kept, limits));
+        let reached = all > 0 && tracked == all;
+        let flew = match all {
+            0 => format!("flew {:.1} s without a target", duration_s(&report.flight.samples)),
+            _ if reached && beyond.is_none() => {
+                format!("flew as commanded: {tracked} of {all} targets")
             }
-            0 => format!("Flew {:.1} s without a target", duration_s(&report.flight.samples)),
-            _ if tracked == all && left_it.is_none() => {
-                format!("Flew as commanded: {tracked} of {all} targets")
-            }
-            _ if left_it.is_some() => format!("tracked {tracked} of {all} targets"),
-            _ => format!("Tracked {tracked} of {all} targets"),
-        });
+            _ if reached => format!("reached {}", all_targets(all)),
+            _ => format!("tracked {tracked} of {all} targets"),
+        };
+        // what was missed comes first: a target, or a limit that the outcome counts
+        let mut first: Vec<String> = match left_it.is_some_and(|(kept, _)| kept.kept) && reached {
+            true => [flew].into_iter().chain(beyond).collect(),
+            false => beyond.into_iter().chain([flew]).collect(),
+        };
+        first.iter_mut().take(1).for_each(|clause| *clause = capital(clause));
         first.extend(slowest(report));
         first.extend(largest_error(&report.segments));
         let late = match report.timed().map(LoopTiming::late) {
@@ -84,11 +87,16 @@ pub(crate) fn verdict(report: &FlightReport) -> Verdict {
     let late = report.timed().map(LoopTiming::late);
     let judged = report.envelope.map(|e| kept(&report.flight.samples, &e)).filter(|k| k.judged);
     let kept = judged.map(|k| k.kept);
+    let beyond = judged.filter(left).and_then(|k| outside_in_short(&k));
     let cycles = report.timed().map_or(0, |timing| timing.cycles.len());
     let outcome = outcome(report, kept, late);
     let reason = match (outcome, late) {
         (Outcome::Late, Some(late)) => {
-            format!("this computer was late in {late} of {cycles} cycles")
+            let slow = format!("this computer was late in {late} of {cycles} cycles");
+            beyond.into_iter().chain([slow]).collect::<Vec<_>>().join(", and ")
+        }
+        (Outcome::Reached, _) => {
+            [all_targets(all)].into_iter().chain(beyond).collect::<Vec<_>>().join("; ")
         }
         _ => reason(all - tracked, late, kept),
     };
@@ -110,6 +118,15 @@ fn outcome(report: &FlightReport, kept: Option<bool>, late: Option<usize>) -> Ou
         _ if report.envelope.is_some() && kept.is_none() => Outcome::Open,
         (_, Some(1..)) => Outcome::Late,
         _ => Outcome::Reached,
+    }
+}
+
+/// Phrase for all targets of a flight with `count` of them.
+fn all_targets(count: usize) -> String {
+    match count {
+        1 => "the target".into(),
+        2 => "both targets".into(),
+        _ => format!("all {count} targets"),
     }
 }
 

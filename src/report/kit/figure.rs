@@ -94,7 +94,7 @@ impl Verdict {
         let list = if details.is_empty() { details } else { format!("<ul>{details}</ul>") };
         let joint = match self.outcome {
             Outcome::Late => ", but ",
-            Outcome::Sound => " ",
+            Outcome::Reached | Outcome::Sound => " ",
             _ => ": ",
         };
         let reason = match self.reason.is_empty() {
