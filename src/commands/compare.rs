@@ -21,11 +21,10 @@ use crate::model::GreyBox;
 use crate::report::ComparisonReport;
 #[cfg(feature = "study")]
 use crate::sysid::amend::Origin;
+use crate::sysid::compare::answer::multiple;
 use crate::sysid::compare::{Answer, Comparison, HorizonScore, ModelResult, Options, compare};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
-#[cfg(feature = "study")]
-use crate::sysid::progress::ignore_progress;
 
 /// Letters that identify the models in the tables: A to Z, then AA to ZZ, and so on without an end.
 fn letters() -> impl Iterator<Item = String> {
@@ -102,7 +101,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     in_doubt |= comparison.flights.len() < arguments.logs.paths.len();
     notes.append(&mut comparison.notes);
     comparison.notes = notes;
-    comparison.answer = answer(arguments, &models, &flights, &mut comparison)?;
+    comparison.answer = answer(arguments, &models, &flights, &comparison)?;
     if !files::is_stdout(arguments.json.as_deref()) {
         print(&comparison);
     }
@@ -128,21 +127,14 @@ fn traced(
     arguments: &Arguments,
     models: &[GreyBox],
     flights: &[Reconstruction],
-    comparison: &mut Comparison,
+    comparison: &Comparison,
 ) -> Result<Option<Answer>> {
     let ([before, _], [_, after]) = (models, &arguments.models[..]) else { return Ok(None) };
     let Some(origin) = Origin::beside(&files::shipped(after), before) else { return Ok(None) };
     let tuned = origin.tuned(before).unwrap_or_else(|| before.clone());
-    // only the page needs more of the tuned model than its errors
-    if arguments.report.is_none() {
-        let errors = crate::sysid::compare::scores(&tuned, flights, &arguments.horizons)?;
-        return Ok(Some(origin.answer(comparison, &errors, &arguments.logs.paths)));
-    }
-    let options = Options { horizons_s: arguments.horizons.clone(), seed: arguments.seed };
-    let tuned = compare(&[tuned], flights, &options, &ignore_progress)?.models.remove(0);
-    let answer = origin.answer(comparison, &tuned.free_run, &arguments.logs.paths);
-    comparison.tuned = Some(tuned);
-    Ok(Some(answer))
+    let errors = crate::sysid::compare::scores(&tuned, flights, &arguments.horizons)?;
+    let shares = crate::sysid::compare::shares(&tuned, flights).ok();
+    Ok(Some(origin.answer(comparison, (&errors[..], shares), &arguments.logs.paths)))
 }
 
 /// `None`: a build without the feature `study` cannot read the files of an amendment.
@@ -151,7 +143,7 @@ fn traced(
     _: &Arguments,
     _: &[GreyBox],
     _: &[Reconstruction],
-    _: &mut Comparison,
+    _: &Comparison,
 ) -> Result<Option<Answer>> {
     Ok(None)
 }
@@ -161,7 +153,7 @@ fn answer(
     arguments: &Arguments,
     models: &[GreyBox],
     flights: &[Reconstruction],
-    comparison: &mut Comparison,
+    comparison: &Comparison,
 ) -> Result<Answer> {
     let traced = traced(arguments, models, flights, comparison)?;
     let answer = traced.unwrap_or_else(|| comparison.answer.clone());
@@ -257,7 +249,7 @@ fn channel_table(models: &[ModelResult]) -> Table {
         for c in model.worst_first() {
             let share = match c.unexplained_fraction {
                 share if share.is_nan() => "not excited".into(),
-                share => format!("{:.2} %", 100.0 * share),
+                share => multiple(share).unwrap_or_else(|| format!("{:.2} %", 100.0 * share)),
             };
             table.add_row([
                 letter.clone(),

@@ -224,6 +224,13 @@ fn the_box_says_where_the_tuned_model_fails() {
     );
     assert!(found.contains("unexplained, with lift_stall 1.60 %"), "{found}");
     assert!(found.find(&answer.error) < found.find(&answer.effect));
+    // an answer that names both channels of the effect is not repeated by the box, and the first figure names both as well
+    let acts = "lift_stall acts in lift (unexplained: 18.2 % tuned by equation error, 1.6 % with it) and in drag less thrust \
+                (unexplained: 9 % tuned by equation error, 2 % with it).";
+    let both = Answer { acts: acts.into(), ..answer.clone() };
+    let page = text(&DiagnosisReport { answer: Some(&both), ..report(&d, None) }.page().render());
+    assert!(page.contains("Seen best: lift with angle of attack."), "{page}");
+    assert!(!page.contains("Where it fails: lift") && page.matches(acts).count() == 2, "{page}");
 
     d.verdict = Verdict::Adequate;
     d.effects.iter_mut().for_each(|c| c.asserted = false);

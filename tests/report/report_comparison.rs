@@ -20,7 +20,6 @@ pub fn comparison(seconds: f64) -> Comparison {
         [("flight-a.csv", 0.0), ("flight-b.ulg", 100.0)].map(|f| flight(f, seconds)).into();
     let models: Vec<ModelResult> = ERRORS.map(|(name, size)| model(name, size, &flights)).into();
     Comparison {
-        tuned: None,
         schema: "greylag.comparison/1",
         program: "greylag 0.1.0".into(),
         seed: 1,

@@ -1,7 +1,8 @@
 //! A made-up diagnosis: a stall asserted with a look-alike, one candidate refused, the rest chance.
 #![allow(dead_code)] // each test that includes this module uses its part
 
-use greylag::sysid::compare::Comparison;
+use greylag::sysid::compare::answer::Acting;
+use greylag::sysid::compare::{ChannelId, Comparison};
 use greylag::sysid::diagnose::{
     Advice, Candidate, ChannelLeft, Curve, Decoy, Diagnosis, FlightEstimate, Measurement, Nulls,
     Parameter, Settings, Status, Tuned, Verdict,
@@ -164,6 +165,12 @@ fn candidate(
         threshold,
         parameters,
         channels: vec![if id.starts_with("drag") { "D" } else { "L" }.into()],
+        acts: match asserted {
+            true => {
+                vec![acts(ChannelId::Lift, [0.182, 0.016]), acts(ChannelId::Drag, [0.09, 0.02])]
+            }
+            false => Vec::new(),
+        },
         indistinguishable_from: match id {
             "lift_stall" => vec!["lift_alpha2".into()],
             "lift_alpha2" => vec!["lift_stall".into()],
@@ -212,6 +219,11 @@ fn curve(id: &str) -> Curve {
         at,
         contribution,
     }
+}
+
+/// A channel with its unexplained shares, without and with the effects.
+fn acts(channel: ChannelId, [tuned, after]: [f64; 2]) -> Acting {
+    Acting { channel, name: channel.name(), given: None, tuned: Some(tuned), after }
 }
 
 /// Three flights diagnosed.

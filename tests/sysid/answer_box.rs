@@ -149,6 +149,9 @@ fn every_number_of_the_box_is_recomputed_from_the_flights() {
     assert!(last[0].starts_with("next: greylag diagnose --model "), "{last:?}");
     assert!(last[1].starts_with("error at 5 s "), "{last:?}");
     all_in_json(&story["answer"]);
+    // a forecast without aerodynamics stands beside the amendment too, and the channels of its effect
+    assert!(story["answer"]["numbers"]["baseline"]["error"].as_f64().unwrap() > 0.0);
+    assert!(amended.contains(story["answer"]["acts"].as_str().unwrap()), "{amended}");
 
     // a third flight, which no fit has seen, by the command that sees the two models alone
     let json = scratch.path().join("compared.json");
@@ -181,13 +184,13 @@ fn every_number_of_the_box_is_recomputed_from_the_flights() {
             .all(|l| l.starts_with("next:") || !l.contains('─') || l.chars().count() <= 100)
     );
     all_in_json(answer);
+    assert!(said.contains(answer["acts"].as_str().unwrap()), "{said}");
+    at(answer["acts"].as_str().unwrap());
+    where_the_effect_acts(&compared, &story, log(2));
 
     let given = GreyBox::load(MODEL.as_ref()).unwrap();
     let fitted = GreyBox::load(&after).unwrap();
-    let mut tuned = given.clone();
-    for p in story["tuned"].as_array().unwrap() {
-        assert!(tuned.set_coefficient(p["name"].as_str().unwrap(), p["value"].as_f64().unwrap()));
-    }
+    let tuned = tuned(&story);
     let numbers = &answer["numbers"];
     let steps = numbers["steps"].as_array().unwrap();
     assert_eq!(steps.len(), 3);
@@ -253,6 +256,48 @@ fn every_number_of_the_box_is_recomputed_from_the_flights() {
     assert!(said.starts_with("On the flight that it was fitted to, the error"), "{said}");
 }
 
+/// The model as given with the coefficients that the amendment `story` tuned without its effects.
+fn tuned(story: &Value) -> GreyBox {
+    let mut tuned = GreyBox::load(MODEL.as_ref()).unwrap();
+    for p in story["tuned"].as_array().unwrap() {
+        assert!(tuned.set_coefficient(p["name"].as_str().unwrap(), p["value"].as_f64().unwrap()));
+    }
+    tuned
+}
+
+/// Every channel of the answer has the shares that the whole comparison states: those of the two models in its document
+/// `compared`, that of the tuned model from a comparison of its own. The second channel falls by at least 0.3 of the first.
+fn where_the_effect_acts(compared: &Value, story: &Value, log: &str) {
+    let numbers = &compared["answer"]["numbers"];
+    let acts = numbers["acts"].as_array().unwrap();
+    assert!((1..=2).contains(&acts.len()) && numbers["method"] == "output_error", "{numbers}");
+    let read = logs::load(log.as_ref(), &logs::Options::default()).unwrap();
+    let tuned = tuned(story);
+    let options = Options::of("flight", &tuned, ActuatorClock::AsRecorded);
+    let flight = reconstruct(&read.flight, &options).unwrap();
+    let quiet = greylag::sysid::progress::ignore_progress;
+    let options = greylag::sysid::compare::Options::default();
+    let own = greylag::sysid::compare::compare(&[tuned], &[flight], &options, &quiet).unwrap();
+    let own = serde_json::to_value(&own.models[0].channels).unwrap();
+    let share = |channels: &Value, act: &Value| {
+        let all = channels.as_array().unwrap().iter();
+        let found = all.clone().find(|c| c["channel"] == act["channel"]).unwrap();
+        found["unexplained_fraction"].as_f64().unwrap()
+    };
+    let mut falls = Vec::new();
+    for act in acts {
+        let models = &compared["models"];
+        for (key, channels) in
+            [("given", &models[0]["channels"]), ("tuned", &own), ("after", &models[1]["channels"])]
+        {
+            let (told, wanted) = (act[key].as_f64().unwrap(), share(channels, act));
+            assert!((told - wanted).abs() <= 1e-6 * wanted.abs(), "{key} {act}: {wanted}");
+        }
+        falls.push(act["tuned"].as_f64().unwrap() - act["after"].as_f64().unwrap());
+    }
+    assert!(falls[0] > 0.0 && falls.iter().all(|fall| *fall >= 0.3 * falls[0]), "{falls:?}");
+}
+
 #[test]
 fn a_diagnosis_begins_with_its_answer_and_ends_with_the_next_command() {
     let scratch = tempfile::tempdir().unwrap();
@@ -308,6 +353,14 @@ fn a_diagnosis_begins_with_its_answer_and_ends_with_the_next_command() {
     let compared: Value = serde_json::from_slice(&fs::read(&compared).unwrap()).unwrap();
     let of_compare = compared["answer"]["numbers"]["steps"][0]["error"].as_f64().unwrap();
     assert!((first / of_compare - 1.0).abs() < 1e-9, "{first} {of_compare}");
+    // the channels of the asserted effects have the shares of the diagnosis
+    for act in answer["numbers"]["acts"].as_array().into_iter().flatten() {
+        let mut channels = told["channels"].as_array().unwrap().iter();
+        let channel = channels.find(|c| c["channel"] == act["channel"]).unwrap();
+        assert_eq!(act["tuned"], channel["tuned_unexplained_fraction"]);
+        assert_eq!(act["after"], channel["unexplained_fraction"]);
+        assert!(said.contains(answer["acts"].as_str().unwrap()), "{said}");
+    }
     // the better of the held state and straight flight stands beside it
     let baseline = &answer["numbers"]["baseline"];
     assert!(["hold the state", "fly straight on"].contains(&baseline["name"].as_str().unwrap()));

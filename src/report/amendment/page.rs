@@ -11,7 +11,7 @@ use crate::{
     AnswerBox, Curves, Figure, Finding, Findings, First, Page, Section, Series, Style, Table,
 };
 use greylag_sysid::amend::{Amendment, FittedFlight, Parameter};
-use greylag_sysid::compare::{HorizonScore, ModelResult};
+use greylag_sysid::compare::HorizonScore;
 use greylag_sysid::diagnose::Tuned;
 
 /// Number of sentences about the amendment that are shown prominently.
@@ -21,11 +21,12 @@ const LEADING: usize = 2;
 pub fn amendment_page(report: &AmendmentReport) -> Page {
     let a = report.amendment;
     let answer = report.answer.unwrap_or(&a.answer).clone();
-    let place = report.held_out.map_or(String::new(), |c| of_amendment(a, &c.models));
+    let acts = answer.numbers.acts.clone();
+    let place = report.held_out.map_or(String::new(), |c| place::of_models(&c.models, &acts));
     let answer = Figure::Answer(Box::new(AnswerBox { answer, place, first: First::Error }));
     let mut sections = vec![Section::new("", "", vec![answer])];
     sections.push(match report.held_out {
-        Some(comparison) => proof::before_and_after(comparison),
+        Some(comparison) => proof::before_and_after(comparison, &place::named(&acts)),
         None => before_and_after(a),
     });
     sections.push(added(a));
@@ -38,17 +39,6 @@ pub fn amendment_page(report: &AmendmentReport) -> Page {
     sections.retain(|s| !s.figures.is_empty());
     let subtitle = format!("{} with {}.", a.model, file_names(&report.log_files));
     Page { title: report.title.clone(), subtitle, sections }
-}
-
-/// Sentence on where the added effects act, or where the models fail if none was added. `models` are the model as given, the
-/// tuned one and the amended one.
-fn of_amendment(a: &Amendment, models: &[ModelResult]) -> String {
-    let joined: Vec<&str> = a.effects.iter().filter(|e| e.joined).map(|e| e.id.as_str()).collect();
-    let added = match models {
-        [given, tuned, after] => place::of_added(&joined, given, Some(tuned), after),
-        _ => None,
-    };
-    added.unwrap_or_else(|| place::of_models(models))
 }
 
 /// Section with the sentences of the amendment; the first [`LEADING`] sentences are prominent.

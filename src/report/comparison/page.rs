@@ -34,7 +34,8 @@ pub fn comparison_page(report: &ComparisonReport) -> Page {
         _ => (vec![answer], Section::new("In words", "", vec![words])),
     };
     let mut sections = vec![Section::new("", "", first)];
-    sections.push(Section::new("Unexplained", &unexplained_note(c), vec![unexplained(c)]));
+    let named = place::named(&c.answer.numbers.acts);
+    sections.push(Section::new("Unexplained", &unexplained_note(c), unexplained(c, &named)));
     sections.push(Section::new("Error growth", &growth_note(c), growth(c)));
     sections.push(later);
     sections.push(regimes::regimes(c));
@@ -56,7 +57,8 @@ pub(crate) fn short_section(c: &Comparison) -> Section {
     for finding in found.lead.iter_mut().chain(&mut found.rest) {
         finding.link = None;
     }
-    let mut figures = vec![Figure::Findings(found), unexplained(c)];
+    let mut figures = vec![Figure::Findings(found)];
+    figures.extend(unexplained(c, &[]));
     figures.extend(growth(c));
     Section::new("Model against flight", UNEXPLAINED_NOTE, figures)
 }
@@ -70,8 +72,8 @@ fn unexplained_note(c: &Comparison) -> String {
     let tuned = c.answer.numbers.steps.iter().any(|step| step.way == Way::Tuned);
     match (tuned, &c.models[..]) {
         (true, [given, after]) => format!(
-            "{UNEXPLAINED_NOTE} “{}” is the model as given: much of its bars is wrong coefficients, which tuning alone \
-             takes away; “{}” is tuned and has what was added.",
+            "{UNEXPLAINED_NOTE} “{}” is the model as given: much of its bars is wrong coefficients, which tuning alone (a fit of \
+             free runs, output error) takes away; “{}” is tuned so and has what was added.",
             given.name, after.name
         ),
         _ => UNEXPLAINED_NOTE.into(),
@@ -137,30 +139,42 @@ pub(crate) fn keys(c: &Comparison) -> Vec<(String, Style)> {
     c.models.iter().enumerate().map(|(i, m)| (m.name.clone(), Style::nth(i))).collect()
 }
 
-/// Bars of the unexplained shares, the worst channels of the first model first.
-pub(crate) fn unexplained(c: &Comparison) -> Figure {
-    let share = |model: &ModelResult, id: ChannelId| {
-        let of = model.channels.iter().find(|ch| ch.channel == id);
-        of.map_or(f64::NAN, |ch| 100.0 * ch.unexplained_fraction)
-    };
+/// Bars of the unexplained shares: first the channels `named` by the answer, then the worst channels of the first model. The rates of
+/// V, α and β have bars of their own if the logs contain the forces, of which the sentences speak then.
+pub(crate) fn unexplained(c: &Comparison, named: &[ChannelId]) -> Vec<Figure> {
+    use ChannelId::{Airspeed, Alpha, Beta, Drag, Lift, Side};
     let mut seen: Vec<ChannelId> = Vec::new();
     for id in c.models.iter().flat_map(ModelResult::worst_first).map(|ch| ch.channel) {
         if !seen.contains(&id) {
             seen.push(id);
         }
     }
-    let groups: Vec<BarGroup> = seen
-        .into_iter()
-        .map(|id| BarGroup {
-            label: channel_name(id),
-            values: c.models.iter().map(|m| share(m, id)).collect(),
-        })
-        .collect();
+    seen.sort_by_key(|id| named.iter().position(|other| other == id).unwrap_or(usize::MAX));
+    let forces = seen.iter().any(|id| matches!(id, Drag | Lift | Side));
+    let again = |id: &ChannelId| forces && matches!(id, Airspeed | Alpha | Beta);
+    let (rates, stated): (Vec<ChannelId>, Vec<ChannelId>) = seen.into_iter().partition(again);
+    let title = if forces { "Unexplained share: forces and moments" } else { "Unexplained share" };
+    let rates_title =
+        "Unexplained share: rates of V, α and β, the forces again as changes of the state";
+    let both = [(title, stated), (rates_title, rates)];
+    both.into_iter().filter(|(_, ids)| !ids.is_empty()).map(|(t, ids)| bars(c, t, ids)).collect()
+}
+
+/// Bars of the unexplained shares of the channels `ids`, %, one bar for each model.
+fn bars(c: &Comparison, title: &str, ids: Vec<ChannelId>) -> Figure {
+    let share = |model: &ModelResult, id: ChannelId| {
+        let of = model.channels.iter().find(|ch| ch.channel == id);
+        of.map_or(f64::NAN, |ch| 100.0 * ch.unexplained_fraction)
+    };
+    let group = |id: ChannelId| BarGroup {
+        label: channel_name(id),
+        values: c.models.iter().map(|m| share(m, id)).collect(),
+    };
     Figure::Bars(Bars {
-        title: "Unexplained share".into(),
+        title: title.into(),
         unit: "%".into(),
         keys: keys(c),
-        groups,
+        groups: ids.into_iter().map(group).collect(),
         full: 100.0,
     })
 }

@@ -31,7 +31,11 @@ pub fn diagnosis_page(report: &DiagnosisReport) -> Page {
             // that a forecast without aerodynamics is better than the model comes before what the model lacks
             let error_first = answer.behind_baseline() || d.effects.iter().any(|c| c.asserted);
             let first = if error_first { First::Error } else { First::Effect };
-            let answer = AnswerBox { answer, place: place::of_diagnosis(d), first };
+            let place = match answer.acts.is_empty() {
+                true => place::of_diagnosis(d),
+                false => place::variables(d),
+            };
+            let answer = AnswerBox { answer, place, first };
             let answer = Figure::Answer(Box::new(answer));
             (answer, Section::new("In words", "", vec![words()]))
         }
@@ -103,9 +107,9 @@ fn where_it_fails(d: &Diagnosis, failing: Option<&Comparison>) -> Section {
         figures.extend(worst(d));
     }
     let note = "Left, in the table and in the bars: the share of each channel's variation that is neither explained by \
-                the model nor by the sensors' noise. “Tuned” is the model with its own coefficients fitted first: \
-                what is left then is for a missing effect to explain. What tuning takes away was wrong \
-                coefficients, no missing effect.";
+                the model nor by the sensors' noise. “Tuned” is the model with its own coefficients fitted first, \
+                by a regression of forces and moments (equation error); `amend` fits free runs (output error), which leaves \
+                other shares. What is left then is for a missing effect to explain; the rest was wrong coefficients.";
     Section::new("Where it fails", note, figures)
 }
 

@@ -28,10 +28,26 @@ pub(crate) fn of_diagnosis(d: &Diagnosis) -> String {
     match d.verdict {
         Verdict::Adequate => {
             format!(
-                "Where it fails: nowhere clearly; {left} % of {name} is the most left after tuning."
+                "Where it fails: nowhere clearly; {left} % of {name} is the most left after tuning by equation \
+                 error."
             )
         }
-        _ => format!("Where it fails: most in {name}, of which {left} % is left after tuning."),
+        _ => format!(
+            "Where it fails: most in {name}, of which {left} % is left after tuning by equation error."
+        ),
+    }
+}
+
+/// Sentence on the variables over which the asserted effects show best, for an answer that names their channels. Empty without a
+/// curve of an effect.
+pub(crate) fn variables(d: &Diagnosis) -> String {
+    let asserted = d.effects.iter().filter(|c| c.asserted);
+    let curves = asserted.filter_map(|c| c.curve.as_ref());
+    let all: Vec<String> =
+        curves.map(|c| format!("{} with {}", name(&c.channel), plain(&c.variable))).collect();
+    match all.is_empty() {
+        true => String::new(),
+        false => format!("Seen best: {}.", all.join("; ")),
     }
 }
 

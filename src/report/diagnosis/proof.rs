@@ -6,7 +6,7 @@ use crate::comparison::page::{growth, unexplained};
 use crate::comparison::tables::summary;
 use crate::kit::numbers::{evidence, number, percent};
 use crate::{Figure, Finding, Findings, Histogram, Rule, Section, Table};
-use greylag_sysid::compare::{Comparison, ModelResult};
+use greylag_sysid::compare::{ChannelId, Comparison, ModelResult};
 use greylag_sysid::diagnose::Diagnosis;
 
 /// Smallest evidence that the histogram shows. Smaller values would stretch its logarithmic axis.
@@ -82,16 +82,16 @@ fn decoys(d: &Diagnosis) -> Table {
 /// The section [`before_and_after`], preceded by a sentence on the change of the error, for a page whose answer is about other
 /// flights.
 pub(crate) fn stated(c: &Comparison) -> Section {
-    let mut section = before_and_after(c);
+    let mut section = before_and_after(c, &[]);
     section.figures.insert(0, Figure::Findings(statement(c)));
     section
 }
 
 /// Section with the errors of free runs (open-loop simulations) and the unexplained shares of each model, on flights that
-/// no fit has used.
-pub(crate) fn before_and_after(c: &Comparison) -> Section {
+/// no fit has used. The channels `named` by the page's answer come first.
+pub(crate) fn before_and_after(c: &Comparison, named: &[ChannelId]) -> Section {
     let mut figures = growth(c);
-    figures.push(unexplained(c));
+    figures.extend(unexplained(c, named));
     // Only the table by horizon is shown; the errors of single states are on the page of the comparison.
     figures.extend(summary(c).figures.into_iter().take(1));
     let names = c.flights.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");

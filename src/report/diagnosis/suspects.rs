@@ -10,6 +10,7 @@ use crate::{
     Choice, ChoiceOption, Evidence, EvidenceGroup, EvidenceRow, Figure, Section, Style, Table,
     Whisker, Whiskers, XyBand, XyFigure, XyMark, XySeries,
 };
+use greylag_sysid::compare::answer::acts_in;
 use greylag_sysid::diagnose::{Candidate, Curve, Diagnosis, Parameter};
 
 /// Anchor of the figure in the page, for links to it.
@@ -128,6 +129,11 @@ pub(crate) fn curves(d: &Diagnosis) -> Section {
         }
         _ => String::new(),
     };
+    let acts = d.effects.iter().filter(|c| c.asserted && !c.acts.is_empty());
+    for c in acts {
+        let channels = acts_in(&c.acts, found.len(), d.compared().method);
+        beside += &format!(" {} acts {channels}.", c.id);
+    }
     if first.curve.is_none() {
         beside += &format!(" {}, the nearest, has no curve over a single variable.", first.id);
     }

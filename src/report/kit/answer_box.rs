@@ -32,7 +32,7 @@ pub enum First {
 
 impl AnswerBox {
     pub(crate) fn html(&self) -> String {
-        let Answer { error, effect, left, next, .. } = &self.answer;
+        let Answer { error, effect, acts, left, next, .. } = &self.answer;
         let line = |class: &str, text: &str| match text.is_empty() {
             true => String::new(),
             false => format!("<p{class}>{}</p>", escape(text)),
@@ -43,10 +43,11 @@ impl AnswerBox {
             First::Effect => [effect, error],
         };
         format!(
-            "<div class=\"verdict answer{}\">{}{}{}{}{next}{}</div>\n",
+            "<div class=\"verdict answer{}\">{}{}{}{}{}{next}{}</div>\n",
             self.tone(),
             line("", one),
             line("", two),
+            line("", acts),
             line(" class=\"rest\"", &self.place),
             line(" class=\"rest\"", left),
             line(" class=\"how\"", ERROR)

@@ -2,13 +2,14 @@
 
 use crate::Style;
 use crate::kit::html::escape;
+use greylag_sysid::compare::answer::multiple;
 
 /// Groups of horizontal bars that begin at zero.
 #[derive(Clone, Debug)]
 pub struct Bars {
     /// Title of the figure.
     pub title: String,
-    /// Unit of the values, such as `%`.
+    /// Unit of the values. Values in `%` are shares of a variance.
     pub unit: String,
     /// Name and style of each bar of a group (for example, of each model), in order.
     pub keys: Vec<(String, Style)>,
@@ -58,8 +59,13 @@ impl Bars {
     }
 }
 
-/// Text of a bar's value with its unit.
+/// Text of a bar's value with its unit. A large share of a variance has the form that sentences have.
 pub(crate) fn value_text(value: f64, unit: &str) -> String {
+    if unit == "%"
+        && let Some(times) = multiple(value / 100.0)
+    {
+        return times;
+    }
     match value {
         v if !v.is_finite() => "cannot be determined".into(),
         v if v.abs() >= 1e4 => format!("{v:.1e} {unit}"),
@@ -91,6 +97,7 @@ mod tests {
 
     #[test]
     fn a_bar_stays_within_its_track_whatever_its_value() {
+        assert_eq!(value_text(36_600.0, "%"), "366 times its variance");
         let values = vec![250.0, f64::NAN, -3.0, f64::INFINITY];
         let keys = ["a", "b", "c", "d"].map(|k| (k.to_string(), Style::Actual)).to_vec();
         let groups = vec![BarGroup { label: "lift".into(), values }];

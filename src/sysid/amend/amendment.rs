@@ -16,7 +16,7 @@ use super::judge::{self, JUDGED_AT_S, Judge};
 use super::output_error::{Fit, FitOptions};
 use super::result::{Amendment, Settings};
 use super::{answer, parameters, story};
-use crate::compare::{Answer, HorizonScore};
+use crate::compare::{Answer, HorizonScore, forecast};
 use crate::diagnose::Candidate;
 use crate::flight_path::reconstruction::{Reconstruction, Segment};
 use crate::per_flight::PerFlight;
@@ -169,7 +169,13 @@ pub fn amend(
         corrected(&model.known, flights, options.per_flight);
     let options = Options { per_flight, ..options.clone() };
     let mut amended = of_right(model, &flights, held_out, &options, progress)?;
-    amended.amendment.answer = answer::answer(&amended.amendment, seen);
+    let forecasts = forecast::unfitted(model, held_out, &options.horizons_s)?;
+    let answer = answer::answer(&amended.amendment, seen, &forecasts);
+    let shares = answer::compared([model, &amended.tuned, &amended.model], held_out);
+    amended.amendment.answer = match shares {
+        Some(shares) => answer.acting(&shares),
+        None => answer,
+    };
     amended.amendment.notes.extend(notes);
     Ok(amended)
 }

@@ -11,16 +11,18 @@ use super::document::{STORY, sha256};
 use super::error::AmendError;
 use super::quick::estimate;
 use super::result::{Amendment, Parameter};
-use crate::compare::answer::{Answer, Decisive, Seen, Stage, Subject, Way};
-use crate::compare::{Comparison, HorizonScore, forecast, scores};
+use crate::compare::answer::{Answer, Compared, Decisive, Method, Seen, Stage, Subject, Way};
+use crate::compare::forecast::{self, ForecastResult};
+use crate::compare::{Comparison, HorizonScore, Shares, scores, shares};
 use crate::diagnose::{Candidate, Diagnosis, Parameter as Estimate};
 use crate::flight_path::reconstruction::{Instant, Reconstruction};
 use greylag_model::GreyBox;
 use greylag_physics::catalogue;
 
 /// The answer of an amendment, from the errors of three models on held-out flights: as given, tuned, and with the added
-/// effects. `seen` states whether the held-out flights were also fitted.
-pub fn answer(story: &Amendment, seen: Seen) -> Answer {
+/// effects. `seen` states whether the held-out flights were also fitted. The baseline is the better of `forecasts`, forecasts without
+/// aerodynamics of the held-out flights.
+pub fn answer(story: &Amendment, seen: Seen, forecasts: &[ForecastResult]) -> Answer {
     let joined: Vec<_> = story.effects.iter().filter(|e| e.joined).collect();
     let effects = joined.iter().filter_map(|e| {
         let own = story.parameters.iter().filter(|p| p.added).map(Known::of);
@@ -37,7 +39,22 @@ pub fn answer(story: &Amendment, seen: Seen) -> Answer {
         flights: story.held_out.clone(),
         seen,
         effects: effects.collect(),
-        baseline: None,
+        baseline: forecast::best(forecasts).map(|f| (f.name, &f.free_run[..])),
+    })
+}
+
+/// The unexplained shares of the models `given`, `tuned` and `after` on `flights`. The coefficients were fitted by output error.
+/// `None` if no flight can be compared.
+pub fn compared(
+    [given, tuned, after]: [&GreyBox; 3],
+    flights: &[Reconstruction],
+) -> Option<Compared> {
+    let of = |model: &GreyBox| shares(model, flights).ok();
+    Some(Compared {
+        given: of(given),
+        tuned: of(tuned),
+        after: of(after)?,
+        method: Method::OutputError,
     })
 }
 
@@ -112,6 +129,7 @@ pub fn diagnosed(
         effects: asserted.iter().filter_map(|c| clearest(c)).collect(),
         baseline: forecast::best(&unfitted).map(|f| (f.name, &f.free_run[..])),
     });
+    let answer = answer.acting(&diagnosis.compared());
     let said = diagnosis.sentences.first().filter(|_| asserted.is_empty());
     let answer = said.map_or(answer.clone(), |said| answer.with_effect(said.clone()));
     let mut tuned = tuned.model;
@@ -218,8 +236,14 @@ impl Origin {
     }
 
     /// The answer of the comparison `c`, whose models are that before the amendment and the amended one. `tuned` holds the
-    /// free-run errors of the tuned model without added effects. `logs` holds the paths of the logs of the comparison.
-    pub fn answer(&self, c: &Comparison, tuned: &[HorizonScore], logs: &[PathBuf]) -> Answer {
+    /// free-run errors of the tuned model without added effects, and its unexplained shares if they are known. `logs` holds the
+    /// paths of the logs of the comparison.
+    pub fn answer(
+        &self,
+        c: &Comparison,
+        tuned: (&[HorizonScore], Option<Shares>),
+        logs: &[PathBuf],
+    ) -> Answer {
         let stage =
             |k: usize, way| Stage { way, model: &c.models[k].name, scores: &c.models[k].free_run };
         let joined: Vec<&Effect> = self.effects.iter().filter(|e| e.joined).collect();
@@ -227,7 +251,7 @@ impl Origin {
         match joined.is_empty() {
             true => stages.push(stage(1, Way::Tuned)),
             false => {
-                stages.push(Stage { way: Way::Tuned, model: &c.models[0].name, scores: tuned });
+                stages.push(Stage { way: Way::Tuned, model: &c.models[0].name, scores: tuned.0 });
                 stages.push(stage(1, Way::Effects));
             }
         }
@@ -240,6 +264,12 @@ impl Origin {
             seen: Seen::Of(logs.iter().filter(|log| self.fitted(log)).count()),
             effects: effects.collect(),
             baseline: None,
+        })
+        .acting(&Compared {
+            given: Some(c.models[0].shares()),
+            tuned: tuned.1,
+            after: c.models[1].shares(),
+            method: Method::OutputError,
         })
     }
 

@@ -22,6 +22,7 @@ mod power;
 mod result;
 mod run;
 mod sentence;
+mod unexplained;
 mod verdict;
 
 pub use crate::weak_form::channels::{ChannelId, RegimeVariable};
@@ -33,5 +34,6 @@ pub use result::{
     Regime, RegimeBins, Settings, StateScore,
 };
 pub use run::{Options, abstentions, compare, scores};
+pub use unexplained::{Shares, shares};
 #[cfg(feature = "study")]
 pub(crate) use verdict::unpredicted;

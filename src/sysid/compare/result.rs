@@ -26,9 +26,6 @@ pub struct Comparison {
     pub sentences: Vec<String>,
     /// The models, in the order of the command line.
     pub models: Vec<ModelResult>,
-    /// The first model with the coefficients that the amendment tuned without added effects, if the second model is its amendment.
-    #[serde(skip)]
-    pub tuned: Option<ModelResult>,
     /// Free-run errors of baseline forecasts without aerodynamics.
     pub forecasts: Vec<ForecastResult>,
     /// The flights, in the order of the command line.

@@ -91,7 +91,6 @@ pub fn compare(
         seed: options.seed,
         sentences: models[0].sentences.clone(),
         models,
-        tuned: None,
         forecasts,
         flights: prepared.iter().zip(used).map(|(p, from)| flight::result(p, from)).collect(),
         settings: Settings {
@@ -123,10 +122,10 @@ pub fn scores(
     Ok(horizons_s.iter().map(|h| runs.score(*h)).collect())
 }
 
-type Usable<'a> = (Vec<&'a Reconstruction>, Vec<Prepared>, Vec<String>);
+pub(super) type Usable<'a> = (Vec<&'a Reconstruction>, Vec<Prepared>, Vec<String>);
 
 /// The flights that can be compared, and notes on the others. An aircraft counts as flying above the airspeed `slowest` (m/s).
-fn usable(flights: &[Reconstruction], slowest: f64) -> Result<Usable<'_>, CompareError> {
+pub(super) fn usable(flights: &[Reconstruction], slowest: f64) -> Result<Usable<'_>, CompareError> {
     if flights.is_empty() {
         return Err(CompareError::NoLog);
     }
@@ -240,14 +239,19 @@ pub fn abstentions(
 type Measured = (Vec<Vec<Series>>, Vec<Vec<[Shift; ChannelId::ALL.len()]>>);
 
 fn seen(model: &GreyBox, flights: &[Prepared], from: &[&Reconstruction]) -> Measured {
+    let series = series(model, flights);
+    let pairs = flights.par_iter().zip(from);
+    let shifts = pairs.map(|(flight, from)| doubt::shifts(model, flight, &from.nuisances));
+    (series, shifts.collect())
+}
+
+/// The channels of each flight, measured and predicted by `model` with the constants of the flights that its file has.
+pub(super) fn series(model: &GreyBox, flights: &[Prepared]) -> Vec<Vec<Series>> {
     let of = |f: &Prepared| match KnownFlight::of(model, f) {
         Some(known) => windows::channels(&known.model, &known.flight),
         None => windows::channels(model, f),
     };
-    let series = flights.par_iter().map(of).collect();
-    let pairs = flights.par_iter().zip(from);
-    let shifts = pairs.map(|(flight, from)| doubt::shifts(model, flight, &from.nuisances));
-    (series, shifts.collect())
+    flights.par_iter().map(of).collect()
 }
 
 /// Flights, their channels (measured and predicted), and the changes of the residuals due to uncertain sensor errors.
@@ -345,7 +349,8 @@ fn leverage(model: &GreyBox, id: ChannelId) -> f64 {
     }
 }
 
-fn noise(id: ChannelId, series: &[Vec<Series>]) -> f64 {
+/// Noise variance of the channel `id`, in its unit squared, averaged over the windows of all flights.
+pub(super) fn noise(id: ChannelId, series: &[Vec<Series>]) -> f64 {
     let own = || series.iter().flatten().filter(|s| s.channel == id);
     let windows = |s: &Series| s.measured.iter().filter(|x| x.is_finite()).count() as f64;
     own().map(|s| s.noise_variance * windows(s)).sum::<f64>() / own().map(windows).sum::<f64>()

@@ -2,6 +2,7 @@
 //! residual is its measured minus its modelled value. A regime is a range of a variable, such as α > 9°, in which the
 //! residual is evaluated.
 
+use super::answer::multiple;
 use super::finding::{Finding, Trend};
 use super::result::Regime;
 use crate::weak_form::channels::{ChannelId, RegimeVariable};
@@ -31,9 +32,6 @@ pub struct Subject<'a> {
     pub flights: usize,
 }
 
-/// Unexplained fraction of the variance above which the sentence states no percentage. The channel is then hardly excited.
-const QUIET: f64 = 9.995;
-
 /// The sentence, without a full stop and beginning with a lower-case letter.
 pub fn sentence(subject: &Subject) -> String {
     let noun = noun(subject.channel);
@@ -60,11 +58,9 @@ pub fn sentence(subject: &Subject) -> String {
             ),
             None => "with no regime in which the model is surely off".into(),
         };
-        if subject.unexplained > QUIET {
+        if let Some(times) = multiple(subject.unexplained) {
             return format!(
-                "{noun} hardly varies in these flights (a quiet axis): the residual is {} times the \
-                 channel's variation, {why}",
-                significant(subject.unexplained.sqrt(), 2)
+                "{noun} hardly varies in these flights (a quiet axis): {times} is unexplained, {why}"
             );
         }
         return format!("{noun}: {share} of its variation is unexplained, {why}");
@@ -311,7 +307,7 @@ mod tests {
         };
         let quiet = of(4232.66);
         assert!(quiet.contains("rolling moment hardly varies") && !quiet.contains('%'), "{quiet}");
-        assert!(quiet.contains("the residual is 65 times the channel's variation"), "{quiet}");
+        assert!(quiet.contains("4233 times its variance is unexplained"), "{quiet}");
         assert!(of(f64::NAN).ends_with(": it is unknown, so nothing can be said"));
         assert!(of(7.18).contains("718 % of its variation is unexplained"), "{}", of(7.18));
     }

@@ -98,7 +98,7 @@ function switcher() {
   const now = way(ways);
   const inside = parts.base.contains(document.activeElement);
   const press = (to) => { pick.base = to; pick.by_hand = false; switcher(); pressed_cell(); };
-  const why = { tuned: "its own coefficients fitted: what is left is for a missing effect to explain", given: ways.includes("tuned") ? "what tuning takes away was wrong coefficients, no missing effect" : "as its file has it; Diagnose tunes it first" };
+  const why = { tuned: "its own coefficients fitted to free runs (output error): what is left is for a missing effect to explain", given: ways.includes("tuned") ? "what tuning takes away was wrong coefficients, no missing effect" : "as its file has it; Diagnose tunes it first" };
   const button = (to) => el("button", { type: "button", "data-base": to, "aria-pressed": to === now ? "true" : "false", disabled: !ways.includes(to), onclick: () => press(to) }, WORD[to]);
   const errors = ["given", "tuned"].map((to) => [error_over(RUN_S, bench.failing.models[ways.indexOf(to)]), WORD[to]]).filter(([error]) => error != null);
   // the header states the error on the flights held out once it is known

@@ -58,7 +58,7 @@ function then(state, tests) {
 /** The answer in the words of the command `amend`. */
 function box(state) {
   const told = verdicts(state)?.answer;
-  return told && el("div", { class: "verdict effect", id: "box" }, [told.error, told.effect, told.left].filter(Boolean).map((line) => el("p", {}, line)));
+  return told && el("div", { class: "verdict effect", id: "box" }, [told.error, told.effect, told.acts, told.left].filter(Boolean).map((line) => el("p", {}, line)));
 }
 
 /** Identity of the saved model. It changes with the accepted effects and with the given model. */

@@ -45,22 +45,27 @@ function first(job) {
 }
 function verdict(bench, diagnosis) {
   const found = diagnosis.effects.find((e) => e.asserted && !ticked(bench, e.id));
-  const said = found ? [missing(found), ...diagnosis.sentences] : diagnosis.sentences;
+  const said = found ? [missing(found, fitted(bench).length), ...diagnosis.sentences] : diagnosis.sentences;
   const [lead, ...rest] = said;
   const then = found ? null : next(bench, diagnosis);
   return el("div", { class: `verdict ${diagnosis.verdict}` }, el("p", {}, lead ?? diagnosis.verdict), then && el("p", { class: "next" }, then), rest.length ? more("More", rest.map((s) => el("p", {}, s)), "sentences") : null);
 }
-/** The first asserted effect that is not accepted, where it acts, and the next step. */
-function missing(found) {
-  const where = found.channels.length ? `, in ${channel_words(found.channels)}` : "";
+/** The first asserted effect that is not accepted, where it acts in the `count` fitted flights, and the next step. Flights name only the
+ *  channels that they move. */
+function missing(found, count) {
+  const share = (x) => (x > 9.995 ? `${show(x)} times its variance` : `${show(100 * x)} %`);
+  const one = (a) => `${a.name} (unexplained: ${share(a.tuned)} tuned by equation error, ${share(a.after)} with it)`;
+  const acts = found.acts?.length ? found.acts.map(one).join(" and in ") : channel_words(found.channels);
+  const few = count < 3 ? "; flights that move other axes may add channels" : "";
+  const where = found.channels.length ? `, in ${acts}, on ${count === 1 ? "the flight" : `the ${count} flights`} fitted${few}` : "";
   const other = found.indistinguishable_from.length ? ` (or ${found.indistinguishable_from.join(", ")})` : "";
   return `Missing: ${found.id}${other}${where}. Next: tick it.`;
 }
+const fitted = (bench) => bench.state.flights.filter((f) => f.role === "fit" && !f.error);
 /** The next step if no effect is left to accept; null if there is none. */
 function next(bench, diagnosis) {
   if (bench.state.stack.length) return `Next, in the pane Model: ${tested(bench.state) ? "judge it on the test flights, then save it" : "save it, then fly it or compare it on further logs"}.`;
-  const fitted = bench.state.flights.filter((f) => f.role === "fit" && !f.error);
-  const alone = diagnosis.verdict === "unknown" && fitted.length === 1;
+  const alone = diagnosis.verdict === "unknown" && fitted(bench).length === 1;
   return alone ? "Next: drop more flights into the pane Flights, then Diagnose again." : null;
 }
 function more(summary, children, id = summary) {
@@ -88,7 +93,7 @@ function suspect(bench, e, most) {
   const tag = e.asserted ? el("span", { class: "tag" }, "asserted") : above && e.refused.length ? el("span", { class: "tag bad" }, "refused") : untold ? el("span", { class: "tag" }, "not asserted") : null;
   const log = (v) => 100 * Math.log10(1 + Math.max(0, v)) / Math.log10(1 + most);
   const facts = [decisive(e)];
-  if (e.heldout_error_reduction != null) facts.push(`explains ${percent(e.heldout_error_reduction)} of what tuning leaves there (squares, on segments not fitted)`);
+  if (e.heldout_error_reduction != null) facts.push(`explains ${percent(e.heldout_error_reduction)} of what tuning by equation error leaves there (squares, on segments not fitted)`);
   if (e.selected_in_bootstraps != null) facts.push(`best in ${percent(e.selected_in_bootstraps)} of bootstraps`);
   if (e.channels.length) facts.push(`acts in ${channel_words(e.channels)}`);
   return el("article", { class: `suspect ${e.asserted ? "asserted" : ""}` },
@@ -96,7 +101,7 @@ function suspect(bench, e, most) {
     el("p", { class: "muted" }, e.description),
     // the numbers come before the curve, which a low window cuts off
     el("p", {}, `Evidence ${show(e.evidence)}; chance reaches ${show(e.threshold)}. `, facts.filter(Boolean).join("; "), "."),
-    e.curve && above ? el("figure", {}, el("figcaption", {}, el("b", {}, `${e.curve.channel} (${e.curve.unit}) over ${e.curve.variable}`), el("span", { class: "muted" }, "dots: what the tuned model leaves; line: the effect")), el("div", { class: "plot", "data-curve": e.id })) : "",
+    e.curve && above ? el("figure", {}, el("figcaption", {}, el("b", {}, `${e.curve.channel} (${e.curve.unit}) over ${e.curve.variable}`), el("span", { class: "muted" }, "dots: what the model tuned by equation error leaves; line: the effect")), el("div", { class: "plot", "data-curve": e.id })) : "",
     el("div", { class: "meter", role: "img", "aria-label": `evidence ${show(e.evidence)}, chance reaches ${show(e.threshold)}`, title: `evidence ${show(e.evidence)}; chance reaches ${show(e.threshold)} (log scale)` },
       el("i", { vars: { width: `${log(e.evidence)}%` } }), el("b", { vars: { left: `${log(e.threshold)}%` } })),
     ...e.refused.map((why) => el("p", { class: "bad" }, why)),

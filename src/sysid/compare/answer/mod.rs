@@ -4,6 +4,7 @@
 //!
 //! The prediction error is that of free runs: simulations of the model with the recorded controls.
 
+pub mod acting;
 pub(super) mod between;
 mod numbers;
 mod words;
@@ -11,7 +12,9 @@ mod words;
 use serde::Serialize;
 
 use super::result::HorizonScore;
+pub use acting::{Acting, Compared, Method};
 pub use numbers::{Baseline, Decisive, InUse, Left, Numbers, Step, Way};
+pub use words::{acts_in, multiple, share};
 
 /// Preferred horizon of an answer, s. If the flights are too short for it, the answer takes the longest shorter horizon that
 /// runs of every model reach.
@@ -26,6 +29,10 @@ pub struct Answer {
     /// Sentences on the added effects with their most significant coefficients, and on the state whose prediction improves
     /// most; empty if there is neither.
     pub effect: String,
+    /// Sentence on the channels (forces, moments or rates) in which the added effects act, with the share of each channel's variance
+    /// that every model leaves unexplained; empty if there is no effect or the shares are unknown.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub acts: String,
     /// Sentence on the largest remaining prediction error, relative to the usual range of its state.
     pub left: String,
     /// The recommended next command; empty if there is none.
@@ -90,6 +97,7 @@ impl Answer {
         Answer {
             error: words::error(&numbers),
             effect: words::effect(&numbers),
+            acts: String::new(),
             left: words::left(&numbers),
             next: String::new(),
             numbers,
@@ -106,9 +114,18 @@ impl Answer {
         Answer { effect, ..self }
     }
 
+    /// This answer with the channels in which its effects act, from the unexplained `shares` of the models.
+    pub fn acting(self, shares: &Compared) -> Answer {
+        let ids: Vec<&str> = self.numbers.effects.iter().map(|e| e.id.as_str()).collect();
+        let acts = acting::acting(&ids, shares);
+        let sentence = words::acts(&ids, &acts, shares.method);
+        let method = (!acts.is_empty()).then_some(shares.method);
+        Answer { acts: sentence, numbers: Numbers { acts, method, ..self.numbers }, ..self }
+    }
+
     /// The non-empty sentences, without the command.
     pub fn lines(&self) -> impl Iterator<Item = &str> {
-        [&self.error, &self.effect, &self.left]
+        [&self.error, &self.effect, &self.acts, &self.left]
             .into_iter()
             .map(String::as_str)
             .filter(|l| !l.is_empty())
@@ -214,6 +231,43 @@ mod tests {
         let json = serde_json::to_value(&answer).unwrap();
         assert_eq!(json["numbers"]["steps"][2]["error"], 0.00083);
         assert_eq!(json["numbers"]["fitted_flights"], 0);
+    }
+
+    #[test]
+    fn both_channels_of_an_effect_have_their_shares() {
+        use crate::compare::ChannelId::{Pitch, Roll};
+        let scores = [
+            (Way::Given, score(0.0873, 1.2, 0.01)),
+            (Way::Tuned, score(0.0234, 0.5, 0.01)),
+            (Way::Effects, score(0.00083, 0.02, 0.002)),
+        ];
+        let shares = |of: [f64; 2]| {
+            let mut all = [f64::NAN; 9];
+            let place = |id| crate::compare::ChannelId::ALL.iter().position(|x| *x == id).unwrap();
+            (all[place(Roll)], all[place(Pitch)]) = (of[0], of[1]);
+            all
+        };
+        let compared = Compared {
+            given: Some(shares([37.2, 0.5])),
+            tuned: Some(shares([0.4, 0.2])),
+            after: shares([0.001, 0.02]),
+            method: Method::OutputError,
+        };
+        let lag = Decisive { id: "actuator_lag".into(), ..drag() };
+        let answer = Answer::of(&subject(&scores, vec![lag])).acting(&compared);
+        assert_eq!(
+            answer.acts,
+            "actuator_lag acts in rolling moment (unexplained: 37.2 times its variance as given, 40 % tuned by output error, \
+             0.1 % with it) and in pitching moment (unexplained: 50 % as given, 20 % tuned by output error, 2 % with it)."
+        );
+        assert!(answer.lines().any(|line| line == answer.acts));
+        let json = serde_json::to_value(&answer).unwrap();
+        assert_eq!(json["numbers"]["acts"][1]["channel"], "m");
+        assert_eq!(json["numbers"]["acts"][1]["after"], 0.02);
+        assert_eq!(json["numbers"]["method"], "output_error");
+        // without an effect there is nothing to place
+        let none = Answer::of(&subject(&scores[..2], Vec::new())).acting(&compared);
+        assert!(none.acts.is_empty() && none.numbers.method.is_none());
     }
 
     #[test]

@@ -6,7 +6,7 @@
 
 use serde::Serialize;
 
-use super::{ANSWER_S, Seen, Stage, Subject};
+use super::{ANSWER_S, Acting, Method, Seen, Stage, Subject};
 use crate::compare::result::{HorizonScore, StateScore};
 use greylag_physics::Channel;
 use greylag_physics::catalogue::describe;
@@ -130,6 +130,12 @@ pub struct Numbers {
     pub baseline: Option<Baseline>,
     /// Effects that the last model has and the first model lacks.
     pub effects: Vec<Decisive>,
+    /// The one or two channels in which these effects act, the largest reduction first; empty if the shares are unknown.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub acts: Vec<Acting>,
+    /// Method by which the coefficients of the models of `acts` were fitted; `None` if `acts` is empty.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub method: Option<Method>,
     /// The state whose prediction shows the improvement best; `None` if no prediction improves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub in_use: Option<InUse>,
@@ -171,12 +177,19 @@ impl Numbers {
             change_percent,
             baseline,
             effects: subject.effects.clone(),
+            acts: Vec::new(),
+            method: None,
             in_use: before
                 .zip(at.last())
                 .and_then(|(before, after)| in_use(before, after, &subject.effects)),
             left: kept.and_then(|kept| left(kept)),
             steps,
         }
+    }
+
+    /// Whether a model was fitted to all of the flights.
+    pub(super) fn fitted(&self) -> bool {
+        self.fitted_flights.is_some_and(|fitted| fitted >= self.flights.len())
     }
 
     /// Whether the only change of the model was to tune it, and its error rises.

@@ -1,7 +1,12 @@
 //! Sentences and phrases of the answer to a comparison or refit, composed from its numbers. The error is that of free runs
 //! (open-loop simulations) at a horizon.
 
+use super::acting::{Acting, Method};
 use super::numbers::{Baseline, Decisive, InUse, Left, NOTICED, Numbers, Step, Way};
+
+/// Unexplained share above which it is stated as a multiple of the variance, because a percentage of four or more digits is hard to
+/// read. The channel then hardly varies in the flights.
+const MULTIPLE: f64 = 9.995;
 
 /// Sentences on the error of the models and its change from one model to the next. If a forecast without aerodynamics errs less
 /// than the model as given, this is stated first.
@@ -21,12 +26,16 @@ pub fn error(n: &Numbers) -> String {
 
 /// Sentences on a model that errs more than `baseline`, whether it is tuned or not: its errors, and what the user can do.
 fn behind(n: &Numbers, baseline: &Baseline, first: &Step, rest: &[Step]) -> String {
+    let (begin, to) = match n.fitted() {
+        true => ("its error".to_owned(), " to these flights"),
+        false => (format!("{} its error", lower(&on(n))), ""),
+    };
     let at = |step: &Step| match step.way {
-        Way::Tuned => format!(", tuned to these flights {}", number(step.error)),
+        Way::Tuned => format!(", tuned{to} {}", number(step.error)),
         _ => format!(",{} {}", by(n, step), number(step.error)),
     };
     format!(
-        "The model is {}: its error at {} s is {}{}. Check axes, signs and units of the logs, fly more and richer manoeuvres, \
+        "The model is {}: {begin} at {} s is {}{}. Check axes, signs and units of the logs, fly more and richer manoeuvres, \
          or fit it from scratch.",
         worse_than(baseline),
         number(n.horizon_s),
@@ -95,9 +104,8 @@ fn in_all(n: &Numbers) -> String {
 
 /// Sentence on a model whose error rises from `given` to `tuned` by tuning.
 fn kept(n: &Numbers, given: f64, tuned: f64) -> String {
-    let fitted = n.fitted_flights.is_some_and(|fitted| fitted >= n.flights.len());
     let (at, given, tuned) = (number(n.horizon_s), number(given), number(tuned));
-    match fitted {
+    match n.fitted() {
         true => format!(
             "Keep the model as it is: its error at {at} s is {given}; tuning it to these flights makes it {tuned}."
         ),
@@ -139,6 +147,45 @@ pub fn effect(n: &Numbers) -> String {
     let used = n.in_use.as_ref().filter(|_| !n.in_vain());
     said.extend(used.map(|used| in_use(n, used, &subject)));
     said.join(" ")
+}
+
+/// Sentence on the channels in which the effects `ids` act; empty without channels.
+pub fn acts(ids: &[&str], acts: &[Acting], method: Method) -> String {
+    if acts.is_empty() {
+        return String::new();
+    }
+    let verb = if ids.len() == 1 { "acts" } else { "act" };
+    format!("{} {verb} {}.", ids.join(" and "), acts_in(acts, ids.len(), method))
+}
+
+/// Phrase with the channels `acts`, each with its unexplained shares, in which a number of `effects` act. The models were fitted by
+/// `method`.
+pub fn acts_in(acts: &[Acting], effects: usize, method: Method) -> String {
+    let it = if effects == 1 { "it" } else { "them" };
+    let by = method.name();
+    let one = |a: &Acting| {
+        let given = a.given.map(|x| format!("{} as given", share(x)));
+        let tuned = a.tuned.map(|x| format!("{} tuned by {by}", share(x)));
+        let with = match a.tuned {
+            Some(_) => format!("{} with {it}", share(a.after)),
+            None => format!("{} tuned by {by} and with {it}", share(a.after)),
+        };
+        let all: Vec<String> = given.into_iter().chain(tuned).chain([with]).collect();
+        format!("in {} (unexplained: {})", a.name, all.join(", "))
+    };
+    acts.iter().map(one).collect::<Vec<_>>().join(" and ")
+}
+
+/// The unexplained `fraction` of a channel's variance as text: in percent, or as a multiple of the variance if it is large.
+pub fn share(fraction: f64) -> String {
+    multiple(fraction).unwrap_or_else(|| format!("{} %", number(100.0 * fraction)))
+}
+
+/// The unexplained `fraction` of a channel's variance as a multiple of the variance; `None` below ten times the variance. All
+/// outputs state such a fraction in this form.
+pub fn multiple(fraction: f64) -> Option<String> {
+    (fraction > MULTIPLE && fraction.is_finite())
+        .then(|| format!("{} times its variance", number(fraction)))
 }
 
 fn one(e: &Decisive) -> String {

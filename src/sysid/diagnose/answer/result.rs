@@ -5,6 +5,8 @@
 
 use serde::Serialize;
 
+use super::shares;
+use crate::compare::answer::{Acting, Compared};
 use crate::per_flight::PerFlight;
 
 /// Overall verdict on the model.
@@ -78,6 +80,13 @@ pub struct Diagnosis {
     pub settings: Settings,
 }
 
+impl Diagnosis {
+    /// The unexplained shares of the re-estimated model, without and with the asserted effects.
+    pub fn compared(&self) -> Compared {
+        shares::compared(&self.channels)
+    }
+}
+
 /// A candidate effect with its evidence.
 #[derive(Clone, Debug, Serialize)]
 pub struct Candidate {
@@ -98,6 +107,10 @@ pub struct Candidate {
     pub parameters: Vec<Parameter>,
     /// Channels (D, L, Y, l, m, n) whose residual the effect reduces, the largest reduction first.
     pub channels: Vec<String>,
+    /// The one or two channels in which the unexplained share falls most with the asserted effects, if this effect is one of them:
+    /// its shares without and with all of them. Empty for other candidates.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub acts: Vec<Acting>,
     /// Ids of effects that these data cannot distinguish from this effect.
     pub indistinguishable_from: Vec<String>,
     /// Share of the residual variance, without that of noise, that the effect removes in blocks (stretches of about 4 s) that

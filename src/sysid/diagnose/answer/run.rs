@@ -89,8 +89,8 @@ fn of_unknown(
         found.refuse_in(&rudder::CHANNELS, RUDDER, &rudder::reason(motion));
     }
     let Judged { abstained, faultless, tuned, doubtful } = judge(&mut found, model, &used, options);
-    let effects = ranking::candidates(&found, options);
     let channels = shares::channels(&found, &abstained);
+    let effects = shares::placed(ranking::candidates(&found, options), &channels);
     let mut measurement = measurement::measurement(&used);
     measurement.extend(per_flight::angles(found.round()));
     let trims = per_flight::trims(found.round());

@@ -3,8 +3,9 @@
 //!
 //! The residual of a channel is the difference between measurement and model. It is averaged over overlapping windows.
 
+use crate::compare::answer::acting::{Compared, Method, acting};
 use crate::compare::{ChannelId, RegimeVariable};
-use crate::diagnose::answer::result::{ChannelLeft, Tuned};
+use crate::diagnose::answer::result::{Candidate, ChannelLeft, Tuned};
 use crate::diagnose::regression::gather::Column;
 use crate::diagnose::search::round::Round;
 use crate::diagnose::search::stepwise::Found;
@@ -32,6 +33,31 @@ pub fn channels(found: &Found, abstained: &[Option<String>; 6]) -> Vec<ChannelLe
         why_abstained: abstained[k].clone(),
     };
     (0..SYMBOLS.len()).filter(|k| before[*k].is_finite()).map(of).collect()
+}
+
+/// The unexplained shares of `channels`, without and with the asserted effects. The coefficients were fitted by equation error.
+pub fn compared(channels: &[ChannelLeft]) -> Compared {
+    let all = |share: fn(&ChannelLeft) -> f64| {
+        ChannelId::ALL.map(|id| {
+            let of = channels.iter().find(|c| c.channel == id.symbol());
+            of.map_or(f64::NAN, share)
+        })
+    };
+    Compared {
+        given: None,
+        tuned: Some(all(|c| c.tuned_unexplained_fraction)),
+        after: all(|c| c.unexplained_fraction),
+        method: Method::EquationError,
+    }
+}
+
+/// `effects` with the channels in which each asserted effect acts, from the unexplained shares of `channels`.
+pub fn placed(mut effects: Vec<Candidate>, channels: &[ChannelLeft]) -> Vec<Candidate> {
+    let shares = compared(channels);
+    for effect in effects.iter_mut().filter(|c| c.asserted) {
+        effect.acts = acting(&[effect.id.as_str()], &shares);
+    }
+    effects
 }
 
 /// Text about the flight condition (regime) in which a channel's mean residual is most significant. `None` if no mean

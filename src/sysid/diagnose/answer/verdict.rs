@@ -155,6 +155,7 @@ mod tests {
             threshold: 7.0,
             parameters: Vec::new(),
             channels: Vec::new(),
+            acts: Vec::new(),
             indistinguishable_from: Vec::new(),
             heldout_error_reduction: heldout,
             selected_in_bootstraps: f64::NAN,
