@@ -252,8 +252,13 @@ fn estimate(c: &Candidate) -> String {
 }
 
 fn channels(diagnosis: &Diagnosis) -> Table {
-    let mut table =
-        table(["channel", "unexplained, tuned", "with the effects", "goes with", "worst regime"]);
+    let mut table = table([
+        "channel",
+        "unexplained, tuned by equation error",
+        "with the effects",
+        "goes with",
+        "worst regime",
+    ]);
     for column in table.column_iter_mut().skip(1).take(2) {
         column.set_cell_alignment(CellAlignment::Right);
     }

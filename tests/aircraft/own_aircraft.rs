@@ -50,6 +50,8 @@ fn what_new_makes_needs_no_mending_and_check_says_the_same() {
         // its own defaults are no fault
         assert_eq!(made.status.code(), Some(0), "{name}: {said}{}", text(&made.stderr));
         assert!(!said.contains("correct:"), "{name}: {said}");
+        // no flight exists yet, so what comes next is said in words, without placeholders
+        assert!(said.contains("next: fly it") && !said.contains("FLIGHTS"), "{name}: {said}");
         let found = json(&found);
         let levels = found["levels"].as_array().unwrap();
         assert!(levels.len() > 3);
@@ -137,7 +139,11 @@ fn mass_span_area_and_logs_make_a_model_that_predicts_another_flight() {
     ]);
     let said = text(&made.stdout);
     assert!(matches!(made.status.code(), Some(0 | 3)), "{said}{}", text(&made.stderr));
-    assert!(said.contains("compare --model"), "{said}");
+    let next = said.trim_end().lines().last().unwrap();
+    assert_eq!(
+        next,
+        format!("next: greylag diagnose --model {}/model.toml --log {a} {b}", folder.display())
+    );
     assert!(fs::read_to_string(folder.join("aircraft.html")).unwrap().contains("<svg"));
     assert!(folder.join("fit.html").exists());
     let found = scratch.path().join("found.json");

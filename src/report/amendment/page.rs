@@ -12,6 +12,7 @@ use crate::{
 };
 use greylag_sysid::amend::{Amendment, FittedFlight, Parameter};
 use greylag_sysid::compare::HorizonScore;
+use greylag_sysid::compare::answer::Method;
 use greylag_sysid::diagnose::Tuned;
 
 /// Number of sentences about the amendment that are shown prominently.
@@ -32,7 +33,7 @@ pub fn amendment_page(report: &AmendmentReport) -> Page {
     sections.push(added(a));
     sections.push(effects(a));
     sections.push(in_words(a));
-    sections.push(tables::tuned(&tuned(a)));
+    sections.push(tables::tuned(&tuned(a), Method::OutputError));
     sections.push(sensors(a).folded());
     sections.push(notes(a).folded());
     sections.push(provenance(report).folded());
@@ -99,7 +100,7 @@ fn before_and_after(a: &Amendment) -> Section {
         return Section::default();
     }
     let note = format!(
-        "Free runs on the recorded actuators of {}, which no fit has seen.",
+        "Free runs on the recorded actuators of {}, which no fit has seen. “Tuned”: fitted to free runs (output error).",
         a.held_out.join(", ")
     );
     Section::new("Before and after", &note, vec![Figure::Curves(curves), Figure::Table(table)])

@@ -10,6 +10,7 @@ use crate::{
     AnswerBox, BarGroup, Bars, Choice, ChoiceOption, Figure, Finding, Findings, First, Grid,
     GridCell, GridRow, Link, Page, Section, Style, Table,
 };
+use greylag_sysid::compare::answer::Method;
 use greylag_sysid::compare::{ChannelId, ChannelResult, Comparison, ModelResult, RegimeVariable};
 use greylag_sysid::diagnose::{Diagnosis, Verdict};
 
@@ -51,7 +52,7 @@ pub fn diagnosis_page(report: &DiagnosisReport) -> Page {
     sections.extend(report.held_out.map(proof::stated));
     sections.push(tables::advice(report));
     sections.push(tables::unseen(d).folded());
-    sections.push(tables::tuned(&d.tuned));
+    sections.push(tables::tuned(&d.tuned, Method::EquationError));
     sections.push(tables::measurement(d).folded());
     sections.push(tables::trims(d).folded());
     sections.push(tables::candidates(d).folded());
@@ -200,7 +201,7 @@ fn sign(variable: RegimeVariable) -> &'static str {
 
 fn left(d: &Diagnosis) -> Figure {
     let asserted = d.effects.iter().any(|c| c.asserted);
-    let mut keys = vec![("tuned".to_string(), Style::Actual)];
+    let mut keys = vec![("tuned by equation error".to_string(), Style::Actual)];
     if asserted {
         keys.push(("with the asserted effects".to_string(), Style::Second));
     }

@@ -8,6 +8,7 @@ use crate::diagnosis::DiagnosisReport;
 use crate::kit::numbers::{NORMAL_95, evidence, interval, number, percent};
 use crate::{Figure, Finding, Findings, Section, Style, Table, Whisker, Whiskers};
 use greylag_logs::quoted;
+use greylag_sysid::compare::answer::Method;
 use greylag_sysid::diagnose::{Advice, Candidate, Diagnosis, Tuned};
 
 pub(crate) fn advice(report: &DiagnosisReport) -> Section {
@@ -55,7 +56,9 @@ pub(crate) fn unseen(d: &Diagnosis) -> Section {
 
 /// The re-estimated coefficients of the model with their values in the model file (priors). The largest changes, in standard
 /// deviations of the prior, come first.
-pub(crate) fn tuned(tuned: &[Tuned]) -> Section {
+///
+/// `method` is the method of the fit.
+pub(crate) fn tuned(tuned: &[Tuned], method: Method) -> Section {
     if tuned.is_empty() {
         return Section::default();
     }
@@ -72,9 +75,10 @@ pub(crate) fn tuned(tuned: &[Tuned]) -> Section {
     };
     let far = sorted.iter().filter(|t| pull(t) > 2.0).count();
     let note = format!(
-        "The model's own coefficients were fitted along, held near their values in the file as \
+        "The model's own coefficients were fitted along by {}, held near their values in the file as \
          strongly as the file says they are known. {} of {} moved by more than two standard \
          deviations.",
+        method.name(),
         if far == 0 { "None".into() } else { far.to_string() },
         sorted.len()
     );
