@@ -13,7 +13,7 @@ fn share(model: &ModelResult, id: ChannelId) -> Option<f64> {
     of.map(|ch| ch.unexplained_fraction).filter(|share| share.is_finite())
 }
 
-/// The channels that the answer of `c` names, in its order; empty if it names none.
+/// The channels of `acts`, in its order.
 pub(crate) fn named(acts: &[Acting]) -> Vec<ChannelId> {
     acts.iter().map(|a| a.channel).collect()
 }
