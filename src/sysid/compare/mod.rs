@@ -8,6 +8,7 @@ pub mod answer;
 pub mod arx;
 mod bins;
 pub mod bootstrap;
+pub mod combination;
 pub mod correction;
 mod discovery;
 mod doubt;
@@ -21,6 +22,7 @@ mod order;
 mod power;
 mod result;
 mod run;
+mod runs;
 mod sentence;
 mod verdict;
 
