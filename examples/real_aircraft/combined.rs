@@ -5,7 +5,9 @@ use anyhow::Result;
 use greylag::model::GreyBox;
 use greylag::sysid::amend::leave_one_out::Scored;
 use greylag::sysid::compare::arx::{Arx, Choice as OfArx};
-use greylag::sysid::compare::combination::{Chosen, Combination, Forecasts, choose, usual_state};
+use greylag::sysid::compare::combination::{
+    Chosen, Combination, EVERY_S, Forecasts, choose, usual_state,
+};
 use greylag::sysid::compare::correction::Correction;
 use greylag::sysid::compare::free_run::START_EVERY_S;
 use greylag::sysid::weak_form::prepared::Prepared;
@@ -13,9 +15,7 @@ use greylag::sysid::weak_form::prepared::Prepared;
 use crate::corrected::Kind;
 use crate::{HORIZONS_S, Row, scaled};
 
-/// Time between the starts of the runs from which weights follow, s.
-const EVERY_S: f64 = 0.5;
-/// Smallest relative decrease of the error for which another structure or correction is taken.
+/// Smallest relative decrease of the error for which a correction or the next combination is taken.
 const CLEARLY: f64 = 0.01;
 
 /// A part that is left out, and the others.
@@ -49,12 +49,16 @@ pub struct Choices {
 }
 
 impl Choices {
-    /// The model's weights in words.
+    /// Correction and weights in words.
     pub fn in_words(&self) -> String {
-        let weights: Vec<String> =
-            self.combination.of_model().iter().map(|w| format!("{w:.2}")).collect();
-        format!("{}, weight {}", self.kind.in_words(), weights.join(" "))
+        format!("{}, {}", self.kind.in_words(), weights(&self.combination))
     }
+}
+
+/// The mean weight over the states of the forecast that is combined, at every horizon, in words.
+fn weights(combination: &Combination) -> String {
+    let all: Vec<String> = combination.of_model().iter().map(|w| format!("{w:.2}")).collect();
+    format!("weight {}", all.join(" "))
 }
 
 /// Runs along `test` of `model` with the correction `kind`, whose residual is fitted to `seen`. A residual that cannot be fitted is
@@ -79,14 +83,13 @@ fn forecasts(
     }
 }
 
-/// The best combination of the structure `models` (one model for each of `folds`) with the correction `kind`. `None` if the parts are
-/// too short.
-fn of_structure(models: &[Option<GreyBox>], folds: &[&Fold], kind: Kind) -> Option<Chosen> {
+/// Runs of the structure `models` (one model for each of `folds`) with the correction `kind` along the parts left out.
+fn on_folds(models: &[Option<GreyBox>], folds: &[&Fold], kind: Kind) -> Vec<Forecasts> {
     let one = |(model, fold): (&Option<GreyBox>, &&Fold)| {
         let model = model.as_ref()?;
         Some(forecasts(model, &fold.others, &fold.test, kind, EVERY_S, fold.usual))
     };
-    choose(&models.iter().zip(folds).filter_map(one).collect::<Vec<_>>())
+    models.iter().zip(folds).filter_map(one).collect()
 }
 
 /// The folds of the parts that `scored` predicts.
@@ -103,49 +106,46 @@ pub struct Best {
     pub combined: Choices,
 }
 
-/// Chooses among the structures `scored` and the corrections `kinds`. `first` is the place of the structure that predicts the parts
-/// best alone. Without a choice the weights are equal.
+/// Chooses correction and weights for the structure number `first` of `scored`, which predicts the parts best alone, or of the model
+/// as given if only that could be judged.
 ///
-/// Another structure or correction than the first is taken if it lowers the error by more than 1 %.
+/// Few things are combined, because few parts judge: the held and the mean state without a model, with the model, and with the model
+/// and the best of the corrections `kinds`. A later one is taken if it lowers the error by more than 1 %. Without any long enough
+/// part the weights are equal.
 pub fn best(scored: &[Scored], first: usize, folds: &[Fold], kinds: &[Kind]) -> Best {
-    let mut tried = Vec::new();
-    for (structure, of) in scored.iter().enumerate().filter(|(_, s)| !s.models.is_empty()) {
-        for kind in kinds.iter().filter(|kind| structure == first || kind.is_quick()) {
-            if let Some(chosen) = of_structure(&of.models, &judged(of, folds), *kind) {
-                eprintln!(
-                    "    {:<45}{:<40} alone {:.4} combined {:.4} {:?} {:.2?}",
-                    of.structure,
-                    kind.in_words(),
-                    chosen.alone,
-                    chosen.error,
-                    chosen.choice,
-                    chosen.combination.of_model()
-                );
-                tried.push((structure, *kind, chosen));
-            }
+    let structure = if first < scored.len() { first } else { 0 };
+    let of = |kind: Kind| {
+        let own = scored.get(structure)?;
+        Some((kind, choose(&on_folds(&own.models, &judged(own, folds), kind))?))
+    };
+    let tried: Vec<(Kind, Chosen)> = kinds.iter().filter_map(|kind| of(*kind)).collect();
+    let equal = Combination::equal(HORIZONS_S.len());
+    let mut choices = Choices { structure: first, kind: Kind::Nothing, combination: equal };
+    let Some((_, plain)) = tried.first() else {
+        return Best { alone: Kind::Nothing, combined: Choices { structure, ..choices } };
+    };
+    let least = tried.iter().min_by(|a, b| a.1.alone.total_cmp(&b.1.alone));
+    let clearly = |t: &&(Kind, Chosen)| t.1.alone < (1.0 - CLEARLY) * plain.alone;
+    let corrected = least.filter(clearly);
+    let own = &scored[structure];
+    let held = on_folds(&own.models, &judged(own, folds), Kind::Nothing);
+    let held = choose(&held.iter().map(Forecasts::held).collect::<Vec<_>>()).map(without_weight);
+    let all = held.iter().map(|c| (Kind::Nothing, c));
+    let all = all.chain([(Kind::Nothing, plain)]).chain(corrected.map(|(kind, c)| (*kind, c)));
+    let mut error = f64::INFINITY;
+    for (kind, chosen) in all.filter(|(_, c)| c.error.is_finite()) {
+        if chosen.error < (1.0 - CLEARLY) * error {
+            error = chosen.error;
+            choices = Choices { structure, kind, combination: chosen.combination.clone() };
         }
     }
-    let least = |error: fn(&Chosen) -> f64, own: bool| {
-        let all = || tried.iter().filter(|t| !own || t.0 == first);
-        let plain = all().find(|t| t.0 == first && matches!(t.1, Kind::Nothing));
-        let best = all().min_by(|a, b| error(&a.2).total_cmp(&error(&b.2)));
-        let clearly = |b: &&(usize, Kind, Chosen)| {
-            plain.is_none_or(|p| error(&b.2) < (1.0 - CLEARLY) * error(&p.2))
-        };
-        best.filter(clearly).or(plain)
-    };
-    let alone = least(|chosen| chosen.alone, true).map_or(Kind::Nothing, |t| t.1);
-    let combined = match least(|chosen| chosen.error, false) {
-        Some((structure, kind, chosen)) => {
-            Choices { structure: *structure, kind: *kind, combination: chosen.combination.clone() }
-        }
-        None => Choices {
-            structure: first,
-            kind: Kind::Nothing,
-            combination: Combination::equal(HORIZONS_S.len()),
-        },
-    };
-    Best { alone, combined }
+    Best { alone: corrected.map_or(Kind::Nothing, |t| t.0), combined: choices }
+}
+
+/// `chosen` with the weight zero for the model.
+fn without_weight(mut chosen: Chosen) -> Chosen {
+    chosen.combination.weights.iter_mut().flatten().for_each(|weights| weights[0] = 0.0);
+    chosen
 }
 
 /// Errors on `test` of `model`, fitted to `seen`, combined as `choices` say.
@@ -155,31 +155,29 @@ pub fn errors(model: &GreyBox, seen: &[Prepared], test: &Prepared, choices: &Cho
     scaled(&choices.combination.scores(&runs))
 }
 
-/// Errors on `test` without a model (held state and mean state), and of ARX as `choice` says (held state, mean state and ARX), both
-/// combined with weights from `folds`; and the weights of ARX. `arx` is fitted to `seen`.
+/// Errors on the one flight of `test` without a model (held and mean state), and of `arx` together with these, both with weights
+/// from `folds`; and the weights of ARX in words. `arx` is fitted to `seen` as `choice` says.
 pub fn without_model(
-    arx: Option<(&Arx, OfArx)>,
+    arx: &Arx,
+    choice: OfArx,
     folds: &[Fold],
     [seen, test]: [&[Prepared]; 2],
     scale: [f64; 8],
-) -> Result<([Row; 2], Vec<f64>)> {
-    let Some((arx, choice)) = arx else {
-        return Ok(([[f64::NAN; HORIZONS_S.len()]; 2], Vec::new()));
-    };
+) -> Result<([Row; 2], String)> {
     let mut parts = Vec::new();
     for fold in folds {
         let Ok(arx) = Arx::fit(&fold.others, choice) else { continue };
         let of = [scale, fold.usual];
         parts.push(Forecasts::of_arx(&arx, &fold.test, &HORIZONS_S, EVERY_S, of)?);
     }
-    let runs =
-        Forecasts::of_arx(arx, &test[0], &HORIZONS_S, START_EVERY_S, [scale, usual_state(seen)])?;
-    let weights = |parts: &[Forecasts]| {
+    let of = [scale, usual_state(seen)];
+    let runs = Forecasts::of_arx(arx, &test[0], &HORIZONS_S, START_EVERY_S, of)?;
+    let chosen = |parts: &[Forecasts]| {
         let equal = || Combination::equal(HORIZONS_S.len());
         choose(parts).map_or_else(equal, |chosen| chosen.combination)
     };
-    let of_arx = weights(&parts);
     let held: Vec<Forecasts> = parts.iter().map(Forecasts::held).collect();
-    let rows = [weights(&held).scores(&runs.held()), of_arx.scores(&runs)];
-    Ok((rows.map(|scores| scaled(&scores)), of_arx.of_model()))
+    let of_arx = chosen(&parts);
+    let rows = [chosen(&held).scores(&runs.held()), of_arx.scores(&runs)];
+    Ok((rows.map(|scores| scaled(&scores)), weights(&of_arx)))
 }

@@ -5,7 +5,11 @@
 //! structure of the fit and the order of ARX by leaving out one of the flights fitted, or one of three parts of each where there
 //! are fewer than three.
 //!
-//! With `-- --learning-curve > results/real-learning-curve.txt` the same is done with less and less training data
+//! The fitted model is also combined with the held and the mean state (`combined.rs`), with weights from what is left out. To be
+//! fair, so is ARX, and the held and the mean state are combined without a model.
+//!
+//! `-- --only NAME` judges the aircraft whose heading has this name, in small letters. With
+//! `-- --learning-curve > results/real-learning-curve.txt` the same is done with less and less training data
 //! (`learning_curve.rs`). With `-- --cuts` the same training data are fitted whole and cut (`cuts.rs`). With
 //! `-- --outside [SETS] > results/outside.txt` models that were fitted inside an envelope are judged outside of it (`outside.rs`).
 
@@ -95,12 +99,14 @@ fn main() -> Result<()> {
         }
         _ => {
             let asked = asked.join(" ");
-            bail!("give nothing, --learning-curve, --cuts or --outside [SETS], not {asked}")
+            bail!(
+                "give nothing, --only NAME, --learning-curve, --cuts or --outside [SETS], not {asked}"
+            )
         }
     }
 }
 
-/// Prints the errors of all aircraft with all of their training data.
+/// Prints the errors, with all of their training data, of all aircraft whose heading has `only` in small letters.
 fn table(only: &str) -> Result<()> {
     println!(
         "Scaled error of free runs on flights held out: mean over those held out ± its standard error"
@@ -112,7 +118,6 @@ fn table(only: &str) -> Result<()> {
             let (fit, test) = aircraft.held_out(left);
             let judged = judged(&aircraft.model, &fit, &test, Corrections::Tried)?;
             println!("  held out {}: {}; {}", test.name, judged.structure, judged.arx);
-            eprintln!("RAW {} {:?}", test.name, judged.errors);
             all.push(judged.errors);
         }
         print_errors(&all);
@@ -182,19 +187,13 @@ fn judged(
     let best = combined::best(&scored, first, &folds, &kinds);
     if corrections == Corrections::Tried {
         errors[CORRECTED] = corrected::errors(&fitted, fit, test, best.alone)?;
+        named = format!("{named}, {}", best.alone.in_words());
     }
-    let together = if best.combined.structure == first {
-        fitted
-    } else {
-        self::fitted(model, fit, best.combined.structure)
-    };
-    errors[COMBINED] = combined::errors(&together, &seen, &unseen[0], &best.combined);
-    named = format!(
-        "{named}, {}; combined: {}, {}",
-        best.alone.in_words(),
-        structures()[best.combined.structure].name,
-        best.combined.in_words()
-    );
+    let (of, other) = (&best.combined, best.combined.structure != first);
+    let together = if other { self::fitted(model, fit, of.structure) } else { fitted };
+    errors[COMBINED] = combined::errors(&together, &seen, &unseen[0], of);
+    let name = &structures()[of.structure].name;
+    named = format!("{named}; combined: {name}, {}", of.in_words());
     let forecasts = forecast::on_unseen(&seen, &unseen, model.scale(), &HORIZONS_S);
     for (row, forecast) in errors[HOLD..].iter_mut().zip(forecasts) {
         *row = scaled(&forecast.free_run);
@@ -202,10 +201,11 @@ fn judged(
     let (arx, mut of_arx) = chosen_arx(&seen, &seen_parts, model.scale());
     if let Some((arx, choice)) = &arx {
         errors[CHOSEN_ARX] = scaled(&arx.scores(&unseen, model.scale(), &HORIZONS_S)?);
+        let flights = [&seen[..], &unseen[..]];
         let (rows, weights) =
-            combined::without_model(Some((arx, *choice)), &folds, [&seen, &unseen], model.scale())?;
+            combined::without_model(arx, *choice, &folds, flights, model.scale())?;
         errors[COMBINED + 1..].copy_from_slice(&rows);
-        of_arx = format!("{of_arx}, weight {weights:.2?}");
+        of_arx = format!("{of_arx}, {weights}");
     }
     Ok(Judged { errors, structure: named, arx: of_arx })
 }
@@ -250,7 +250,12 @@ fn chosen_structure(model: &GreyBox, parts: &[Reconstruction]) -> (Vec<Scored>, 
     match of(&structures) {
         Ok(scored) => {
             let chosen = scored.iter().position(|s| s.chosen).unwrap_or(0);
-            for s in &scored { eprintln!("  LOO {:<40} {:.4} ± {:.4} {}", s.structure, s.mean, s.standard_error, s.chosen); }
+            for s in &scored {
+                eprintln!(
+                    "  LOO {:<40} {:.4} ± {:.4} {}",
+                    s.structure, s.mean, s.standard_error, s.chosen
+                );
+            }
             (scored, chosen, structures[chosen].name.clone())
         }
         Err(why) => {

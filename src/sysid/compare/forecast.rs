@@ -65,7 +65,7 @@ impl Forecast {
     /// Makes one run from sample `start` of `segment`. Returns the measured and the predicted state after each number of steps in
     /// `looks` that the segment reaches; `None` once the run has diverged. It ends early as `end` says, with the distances divided
     /// by `scale`.
-    fn run(
+    pub(super) fn run(
         &self,
         segment: &[Instant],
         dt: f64,
