@@ -15,8 +15,11 @@ use greylag::sysid::weak_form::prepared::Prepared;
 use crate::corrected::Kind;
 use crate::{HORIZONS_S, Row, scaled};
 
-/// Smallest relative decrease of the error for which a correction or the next combination is taken.
+/// Smallest relative decrease of the error for which another structure or correction is taken.
 const CLEARLY: f64 = 0.01;
+
+/// Place of the model as given among the structures.
+const GIVEN: usize = 0;
 
 /// A part that is left out, and the others.
 pub struct Fold {
@@ -83,13 +86,14 @@ fn forecasts(
     }
 }
 
-/// Runs of the structure `models` (one model for each of `folds`) with the correction `kind` along the parts left out.
-fn on_folds(models: &[Option<GreyBox>], folds: &[&Fold], kind: Kind) -> Vec<Forecasts> {
+/// The best combination of the structure `models` (one model for each of `folds`) with the correction `kind`. `None` if the parts are
+/// too short.
+fn of_structure(models: &[Option<GreyBox>], folds: &[&Fold], kind: Kind) -> Option<Chosen> {
     let one = |(model, fold): (&Option<GreyBox>, &&Fold)| {
         let model = model.as_ref()?;
         Some(forecasts(model, &fold.others, &fold.test, kind, EVERY_S, fold.usual))
     };
-    models.iter().zip(folds).filter_map(one).collect()
+    choose(&models.iter().zip(folds).filter_map(one).collect::<Vec<_>>())
 }
 
 /// The folds of the parts that `scored` predicts.
@@ -106,46 +110,41 @@ pub struct Best {
     pub combined: Choices,
 }
 
-/// Chooses correction and weights for the structure number `first` of `scored`, which predicts the parts best alone, or of the model
-/// as given if only that could be judged.
+/// Chooses among the structures `scored` and the corrections `kinds`. `first` is the place of the structure that predicts the parts
+/// best alone. Without a choice the weights are equal.
 ///
-/// Few things are combined, because few parts judge: the held and the mean state without a model, with the model, and with the model
-/// and the best of the corrections `kinds`. A later one is taken if it lowers the error by more than 1 %. Without any long enough
-/// part the weights are equal.
+/// Another structure or correction than the first is taken if it lowers the error by more than 1 %.
 pub fn best(scored: &[Scored], first: usize, folds: &[Fold], kinds: &[Kind]) -> Best {
-    let structure = if first < scored.len() { first } else { 0 };
-    let of = |kind: Kind| {
-        let own = scored.get(structure)?;
-        Some((kind, choose(&on_folds(&own.models, &judged(own, folds), kind))?))
-    };
-    let tried: Vec<(Kind, Chosen)> = kinds.iter().filter_map(|kind| of(*kind)).collect();
-    let equal = Combination::equal(HORIZONS_S.len());
-    let mut choices = Choices { structure: first, kind: Kind::Nothing, combination: equal };
-    let Some((_, plain)) = tried.first() else {
-        return Best { alone: Kind::Nothing, combined: Choices { structure, ..choices } };
-    };
-    let least = tried.iter().min_by(|a, b| a.1.alone.total_cmp(&b.1.alone));
-    let clearly = |t: &&(Kind, Chosen)| t.1.alone < (1.0 - CLEARLY) * plain.alone;
-    let corrected = least.filter(clearly);
-    let own = &scored[structure];
-    let held = on_folds(&own.models, &judged(own, folds), Kind::Nothing);
-    let held = choose(&held.iter().map(Forecasts::held).collect::<Vec<_>>()).map(without_weight);
-    let all = held.iter().map(|c| (Kind::Nothing, c));
-    let all = all.chain([(Kind::Nothing, plain)]).chain(corrected.map(|(kind, c)| (*kind, c)));
-    let mut error = f64::INFINITY;
-    for (kind, chosen) in all.filter(|(_, c)| c.error.is_finite()) {
-        if chosen.error < (1.0 - CLEARLY) * error {
-            error = chosen.error;
-            choices = Choices { structure, kind, combination: chosen.combination.clone() };
+    let mut tried = Vec::new();
+    for (structure, of) in scored.iter().enumerate().filter(|(_, s)| !s.models.is_empty()) {
+        for kind in kinds.iter().filter(|kind| structure == first || kind.is_quick()) {
+            if let Some(chosen) = of_structure(&of.models, &judged(of, folds), *kind) {
+                tried.push((structure, *kind, chosen));
+            }
         }
     }
-    Best { alone: corrected.map_or(Kind::Nothing, |t| t.0), combined: choices }
-}
-
-/// `chosen` with the weight zero for the model.
-fn without_weight(mut chosen: Chosen) -> Chosen {
-    chosen.combination.weights.iter_mut().flatten().for_each(|weights| weights[0] = 0.0);
-    chosen
+    let least = |error: fn(&Chosen) -> f64, own: bool| {
+        let all = || tried.iter().filter(|t| !own || t.0 == first);
+        let plain = all().find(|t| t.0 == first && matches!(t.1, Kind::Nothing));
+        let best = all().min_by(|a, b| error(&a.2).total_cmp(&error(&b.2)));
+        let clearly = |b: &&(usize, Kind, Chosen)| {
+            plain.is_none_or(|p| error(&b.2) < (1.0 - CLEARLY) * error(&p.2))
+        };
+        best.filter(clearly).or(plain)
+    };
+    let alone = least(|chosen| chosen.alone, true).map_or(Kind::Nothing, |t| t.1);
+    let combined = match least(|chosen| chosen.error, false) {
+        Some((structure, kind, chosen)) => {
+            Choices { structure: *structure, kind: *kind, combination: chosen.combination.clone() }
+        }
+        // too short for a judgement, and so for a fit
+        None => Choices {
+            structure: GIVEN,
+            kind: Kind::Nothing,
+            combination: Combination::equal(HORIZONS_S.len()),
+        },
+    };
+    Best { alone, combined }
 }
 
 /// Errors on `test` of `model`, fitted to `seen`, combined as `choices` say.

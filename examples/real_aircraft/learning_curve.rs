@@ -14,7 +14,7 @@ use greylag::sysid::flight_path::reconstruction::Reconstruction;
 
 use crate::aircraft::{self, Aircraft, numbered, pieces, seconds};
 use crate::ratios::{self, RIVALS};
-use crate::{COMBINED, Corrections, Errors, FITTED, HORIZONS_S, WAYS, judged, print_errors};
+use crate::{COMBINED, Corrections, Errors, FITTED, WAYS, judged, print_errors};
 
 /// A share of the training data.
 struct Share {
