@@ -3,7 +3,7 @@
 use anyhow::Result;
 use greylag::model::GreyBox;
 use greylag::sysid::compare::arx::{Arx, Choice};
-use greylag::sysid::compare::correction::{Correction, Observer, scores};
+use greylag::sysid::compare::correction::{Correction, Observer, Pull, scores};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use greylag::sysid::weak_form::prepared::Prepared;
 
@@ -17,6 +17,10 @@ const DECAY_S: [f64; 3] = [0.3, 1.0, 3.0];
 const ORDERS: [usize; 4] = [1, 2, 4, 8];
 /// Ridges of a linear residual, dimensionless.
 const RIDGES: [f64; 5] = [1e-4, 1e-2, 0.1, 1.0, 10.0];
+/// Time constants of the pull of the attitude towards the start of a run, s.
+const ATTITUDE_S: [f64; 4] = [1.0, 2.0, 5.0, f64::INFINITY];
+/// Time constants of the pull of the airspeed towards the start of a run, s.
+const AIRSPEED_S: [f64; 3] = [1.0, 3.0, f64::INFINITY];
 /// Smallest relative decrease of the error for which runs are corrected.
 const CLEARLY: f64 = 0.01;
 
@@ -29,6 +33,8 @@ pub enum Kind {
     Observer(Observer),
     /// A linear residual of the model.
     Linear(Choice),
+    /// A pull towards the start of each run.
+    Pull(Pull),
 }
 
 impl Kind {
@@ -37,7 +43,16 @@ impl Kind {
         let observers = PAST_S.iter().flat_map(|&past_s| {
             DECAY_S.iter().map(move |&decay_s| Kind::Observer(Observer { past_s, decay_s }))
         });
-        [Kind::Nothing].into_iter().chain(observers).chain(Kind::of_order_and_ridge()).collect()
+        Kind::pulls().into_iter().chain(observers).chain(Kind::of_order_and_ridge()).collect()
+    }
+
+    /// The model alone, and pulls towards the start.
+    pub fn pulls() -> Vec<Kind> {
+        let pulls = ATTITUDE_S.iter().flat_map(|&attitude_s| {
+            AIRSPEED_S.iter().map(move |&airspeed_s| Pull { attitude_s, airspeed_s })
+        });
+        let some = pulls.filter(|p| p.attitude_s.is_finite() || p.airspeed_s.is_finite());
+        [Kind::Nothing].into_iter().chain(some.map(Kind::Pull)).collect()
     }
 
     /// The linear residuals that are tried. The first is [`Kind::Nothing`].
@@ -51,6 +66,11 @@ impl Kind {
         })
     }
 
+    /// Whether the correction takes no longer than the model alone.
+    pub fn is_quick(&self) -> bool {
+        matches!(self, Kind::Nothing | Kind::Pull(_))
+    }
+
     /// The correction in words.
     pub fn in_words(&self) -> String {
         match self {
@@ -60,6 +80,9 @@ impl Kind {
             }
             Kind::Linear(Choice { order, ridge }) => {
                 format!("linear residual of order {order}, ridge {ridge:?}")
+            }
+            Kind::Pull(Pull { attitude_s, airspeed_s }) => {
+                format!("pull of attitude {attitude_s} s, airspeed {airspeed_s} s")
             }
         }
     }
@@ -78,6 +101,7 @@ pub fn errors(
     match kind {
         Kind::Nothing => of(None),
         Kind::Observer(observer) => of(Some(Correction::Observer(observer))),
+        Kind::Pull(pull) => of(Some(Correction::Pull(pull))),
         Kind::Linear(choice) => {
             let seen =
                 fit.iter().map(|f| Prepared::new(f, slowest)).collect::<Result<Vec<_>, _>>()?;

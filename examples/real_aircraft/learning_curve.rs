@@ -13,13 +13,8 @@ use anyhow::Result;
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 
 use crate::aircraft::{self, Aircraft, numbered, pieces, seconds};
-use crate::{
-    CHOSEN_ARX, Corrections, Errors, FITTED, HOLD, HORIZONS_S, LEAST_SQUARES, WAYS, judged,
-    print_errors,
-};
-
-/// Places in [`WAYS`] of what the fitted model is compared with: least squares, hold, straight on, and ARX of a chosen order.
-const RIVALS: [usize; 4] = [LEAST_SQUARES, HOLD, HOLD + 1, CHOSEN_ARX];
+use crate::ratios::{self, RIVALS};
+use crate::{COMBINED, Corrections, Errors, FITTED, WAYS, judged, print_errors};
 
 /// A share of the training data.
 struct Share {
@@ -50,33 +45,21 @@ struct Point {
     durations_s: Vec<f64>,
 }
 
-/// Ratio of the error of the fitted model to that of its best rival.
-struct Ratio {
-    /// The ratio of the mean errors over the flights held out, dimensionless.
-    value: f64,
-    /// Standard error of the ratio.
-    error: f64,
-    /// Number of flights held out.
-    flights: usize,
-    /// Place of the best rival in [`WAYS`].
-    best: usize,
-}
-
 /// Prints the learning curve of every aircraft; what is being done goes to the standard error stream.
 pub fn print() -> Result<()> {
     println!(
         "Learning curve: scaled error of free runs on flights held out, all choices and fits by a share of the training data.\n\
          Errors are averaged over the training sets of a share, then over the flights held out; ± is the standard error over the \
          latter.\n\
-         The ratio is that of the error of the fitted model to the lowest error of the others: least squares, hold the state, straight \
-         on, ARX of a chosen order."
+         The ratio is that of the error of the fitted model, alone or combined, to the lowest error of the others: least squares, hold \
+         the state, straight on, ARX of a chosen order."
     );
     for aircraft in aircraft::all()? {
         let points =
             SHARES.iter().map(|share| point(&aircraft, share)).collect::<Result<Vec<_>>>()?;
         println!("\n{}", aircraft.name);
-        println!("  error of the fitted model / lowest error of the others");
-        println!("  {:<18}{:>6}{:>10}{:>34}{:>34}{:>34}", "", "sets", "each", "1 s", "2 s", "5 s");
+        println!("  error / lowest error of the others");
+        println!("  {:<36}{:>6}{:>10}{:>34}{:>34}{:>34}", "", "sets", "each", "1 s", "2 s", "5 s");
         points.iter().for_each(print_ratios);
         for point in &points {
             println!("\n  {}: scaled errors", point.name);
@@ -132,41 +115,14 @@ fn averaged(all: &[Errors]) -> Errors {
     std::array::from_fn(|way| std::array::from_fn(|horizon| mean(way, horizon)))
 }
 
-/// Prints the line of `point` in the table of ratios.
+/// Prints the lines of `point` in the table of ratios.
 fn print_ratios(point: &Point) {
-    let cells: Vec<String> = (0..HORIZONS_S.len())
-        .map(|horizon| match ratio(&point.errors, horizon) {
-            None => "-".into(),
-            Some(Ratio { value, flights: 1, best, .. }) => format!("{value:.2} (1) {}", WAYS[best]),
-            Some(Ratio { value, error, flights, best }) => {
-                format!("{value:.2} ± {error:.2} ({flights}) {}", WAYS[best])
-            }
-        })
-        .collect();
     let mean_s = point.durations_s.iter().sum::<f64>() / point.durations_s.len() as f64;
-    let each = format!("{mean_s:.0} s");
     let sets = point.durations_s.len() / point.errors.len();
-    println!(
-        "  {:<18}{sets:>6}{each:>10}{:>34}{:>34}{:>34}",
-        point.name, cells[0], cells[1], cells[2]
-    );
-}
-
-/// The ratio at number `horizon` of [`HORIZONS_S`]; `None` if no flight held out is long enough.
-///
-/// The best rival is the one with the lowest mean over the flights held out. It is chosen after the fact, in favour of the
-/// rivals.
-fn ratio(errors: &[Errors], horizon: usize) -> Option<Ratio> {
-    let known: Vec<&Errors> = errors.iter().filter(|e| e[FITTED][horizon].is_finite()).collect();
-    let n = known.len() as f64;
-    let mean = |way: usize| known.iter().map(|e| e[way][horizon]).sum::<f64>() / n;
-    // the mean of a rival that is missing for one of the flights is NaN
-    let rivals = RIVALS.into_iter().filter(|way| mean(*way).is_finite());
-    let best = rivals.min_by(|a, b| mean(*a).total_cmp(&mean(*b)))?;
-    let value = mean(FITTED) / mean(best);
-    // to first order, the error of a ratio of two means is that of the mean of these differences, relative to the denominator
-    let left = |e: &&Errors| e[FITTED][horizon] - value * e[best][horizon];
-    let spread = known.iter().map(|e| left(e).powi(2)).sum::<f64>() / (n - 1.0);
-    let error = (spread / n).sqrt() / mean(best);
-    Some(Ratio { value, error, flights: known.len(), best })
+    let each = format!("{mean_s:.0} s");
+    for (way, rivals) in [(FITTED, RIVALS), (COMBINED, RIVALS)] {
+        let name = format!("{}, {}", point.name, WAYS[way]);
+        let [a, b, c] = ratios::cells(&point.errors, way, &rivals);
+        println!("  {name:<36}{sets:>6}{each:>10}{a:>34}{b:>34}{c:>34}");
+    }
 }

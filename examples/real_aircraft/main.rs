@@ -5,22 +5,28 @@
 //! structure of the fit and the order of ARX by leaving out one of the flights fitted, or one of three parts of each where there
 //! are fewer than three.
 //!
-//! With `-- --learning-curve > results/real-learning-curve.txt` the same is done with less and less training data
+//! The fitted model is also combined with the held and the mean state (`combined.rs`), with weights from what is left out. To be
+//! fair, so is ARX, and the held and the mean state are combined without a model.
+//!
+//! `-- --only NAME` judges the aircraft whose heading has this name, in small letters. With
+//! `-- --learning-curve > results/real-learning-curve.txt` the same is done with less and less training data
 //! (`learning_curve.rs`). With `-- --cuts` the same training data are fitted whole and cut (`cuts.rs`). With
 //! `-- --outside [SETS] > results/outside.txt` models that were fitted inside an envelope are judged outside of it (`outside.rs`).
 
 mod aircraft;
+mod combined;
 mod corrected;
 mod cuts;
 mod learning_curve;
 mod least_squares;
 mod outside;
 mod outside_flights;
+mod ratios;
 
 use anyhow::{Context, Result, bail};
 use greylag::model::GreyBox;
-use greylag::sysid::amend::leave_one_out::{Fitted, Structure, leave_one_out};
-use greylag::sysid::amend::{Options, amend};
+use greylag::sysid::amend::leave_one_out::{Fitted, Scored, Structure, leave_one_out};
+use greylag::sysid::amend::{Options, Prior, Refused, amend};
 use greylag::sysid::compare::arx::{self, Arx, Choice};
 use greylag::sysid::compare::{HorizonScore, forecast, scores};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
@@ -35,7 +41,7 @@ use least_squares::least_squares;
 /// Horizons of the free runs, s.
 const HORIZONS_S: [f64; 3] = [1.0, 2.0, 5.0];
 /// What is judged, in the order of the table.
-const WAYS: [&str; 8] = [
+const WAYS: [&str; 11] = [
     "from geometry",
     "fitted",
     "fitted, corrected",
@@ -44,6 +50,9 @@ const WAYS: [&str; 8] = [
     "straight on",
     "ARX of order 1",
     "ARX, order chosen",
+    "fitted, combined",
+    "no model, combined",
+    "ARX, combined",
 ];
 /// Place of the fitted model in [`WAYS`].
 const FITTED: usize = 1;
@@ -55,6 +64,8 @@ const LEAST_SQUARES: usize = 3;
 const HOLD: usize = 4;
 /// Place of the ARX forecast in [`WAYS`] whose order is chosen.
 const CHOSEN_ARX: usize = 7;
+/// Place of the combination of the fitted model in [`WAYS`]. That without a model and that of ARX follow.
+const COMBINED: usize = 8;
 /// Place of the structure among those of [`structures`] that is fitted where the data are too short for a choice.
 const TUNED: usize = 1;
 
@@ -77,7 +88,8 @@ fn main() -> Result<()> {
     let asked: Vec<String> = std::env::args().skip(1).collect();
     let asked: Vec<&str> = asked.iter().map(String::as_str).collect();
     match asked[..] {
-        [] => table(),
+        [] => table(""),
+        ["--only", name] => table(name),
         ["--learning-curve"] => learning_curve::print(),
         ["--cuts"] => cuts::print(),
         ["--outside"] => outside::print(outside::SETS),
@@ -87,17 +99,19 @@ fn main() -> Result<()> {
         }
         _ => {
             let asked = asked.join(" ");
-            bail!("give nothing, --learning-curve, --cuts or --outside [SETS], not {asked}")
+            bail!(
+                "give nothing, --only NAME, --learning-curve, --cuts or --outside [SETS], not {asked}"
+            )
         }
     }
 }
 
-/// Prints the errors of all aircraft with all of their training data.
-fn table() -> Result<()> {
+/// Prints the errors, with all of their training data, of all aircraft whose heading has `only` in small letters.
+fn table(only: &str) -> Result<()> {
     println!(
         "Scaled error of free runs on flights held out: mean over those held out ± its standard error"
     );
-    for aircraft in aircraft::all()? {
+    for aircraft in aircraft::all()?.into_iter().filter(|a| a.name.to_lowercase().contains(only)) {
         println!("\n{}", aircraft.name);
         let mut all = Vec::new();
         for left in 0..aircraft.flights.len() {
@@ -107,6 +121,7 @@ fn table() -> Result<()> {
             all.push(judged.errors);
         }
         print_errors(&all);
+        ratios::print(&all);
     }
     Ok(())
 }
@@ -159,26 +174,38 @@ fn judged(
     };
     let parts = parts(fit);
     let (seen, seen_parts, unseen) = (ready(fit)?, ready(&parts[..])?, ready(test)?);
-    let (fitted, structure, mut named) = fitted(model, fit, &parts);
+    let folds = combined::folds(&seen_parts);
+    let (scored, first, mut named) = chosen_structure(model, &parts);
+    let fitted = fitted(model, fit, first);
     let mut errors = [[f64::NAN; HORIZONS_S.len()]; WAYS.len()];
     for (place, model) in
         [(0, model), (FITTED, &fitted), (LEAST_SQUARES, &least_squares(model, &seen))]
     {
         errors[place] = scaled(&scores(model, test, &HORIZONS_S)?);
     }
+    let kinds = if corrections == Corrections::Tried { Kind::all() } else { Kind::pulls() };
+    let best = combined::best(&scored, first, &folds, &kinds);
     if corrections == Corrections::Tried {
-        let correction =
-            corrected::chosen(&Kind::all(), &parts, |others| tuned(model, others, structure))?;
-        errors[CORRECTED] = corrected::errors(&fitted, fit, test, correction)?;
-        named = format!("{named}, {}", correction.in_words());
+        errors[CORRECTED] = corrected::errors(&fitted, fit, test, best.alone)?;
+        named = format!("{named}, {}", best.alone.in_words());
     }
+    let (of, other) = (&best.combined, best.combined.structure != first);
+    let together = if other { self::fitted(model, fit, of.structure) } else { fitted };
+    errors[COMBINED] = combined::errors(&together, &seen, &unseen[0], of);
+    let name = &structures()[of.structure].name;
+    named = format!("{named}; combined: {name}, {}", of.in_words());
     let forecasts = forecast::on_unseen(&seen, &unseen, model.scale(), &HORIZONS_S);
     for (row, forecast) in errors[HOLD..].iter_mut().zip(forecasts) {
         *row = scaled(&forecast.free_run);
     }
-    let (arx, of_arx) = chosen_arx(&seen, &seen_parts, model.scale());
-    if let Some(arx) = arx {
+    let (arx, mut of_arx) = chosen_arx(&seen, &seen_parts, model.scale());
+    if let Some((arx, choice)) = &arx {
         errors[CHOSEN_ARX] = scaled(&arx.scores(&unseen, model.scale(), &HORIZONS_S)?);
+        let flights = [&seen[..], &unseen[..]];
+        let (rows, weights) =
+            combined::without_model(arx, *choice, &folds, flights, model.scale())?;
+        errors[COMBINED + 1..].copy_from_slice(&rows);
+        of_arx = format!("{of_arx}, {weights}");
     }
     Ok(Judged { errors, structure: named, arx: of_arx })
 }
@@ -198,7 +225,7 @@ fn parts(fit: &[Reconstruction]) -> Vec<Reconstruction> {
 }
 
 /// The structures of a fit that are tried, with their names.
-fn structures() -> [Structure; 5] {
+fn structures() -> Vec<Structure> {
     let of = |per_flight: PerFlight| Fitted::Coefficients { effects: Vec::new(), per_flight };
     let tuned = PerFlight { sensors: SensorErrors::Dropped, ..PerFlight::default() };
     let sensors = PerFlight { sensors: SensorErrors::Kept, ..tuned };
@@ -210,36 +237,58 @@ fn structures() -> [Structure; 5] {
         ("tuned, sensor errors of the installation", of(sensors)),
         ("tuned, axes of each flight", of(axes)),
         ("tuned, trims of each flight", of(trims)),
+        ("from scratch", Fitted::FromScratch),
     ];
-    structures.map(|(name, fitted)| Structure { name: name.into(), fitted })
+    structures.map(|(name, fitted)| Structure { name: name.into(), fitted }).into()
 }
 
-/// `model` fitted to all of `fit` with the structure that predicts each of `parts` best from the others, and what that is.
-///
-/// Where the parts are too short for a choice, the coefficients alone are fitted; where a fit fails, the model stays as given.
-fn fitted(
-    model: &GreyBox,
-    fit: &[Reconstruction],
-    parts: &[Reconstruction],
-) -> (GreyBox, Option<PerFlight>, String) {
+/// The errors of all structures on `parts` left out, the place of the one that predicts them best, and what that is. Where the parts
+/// are too short for a choice, the coefficients alone are fitted.
+fn chosen_structure(model: &GreyBox, parts: &[Reconstruction]) -> (Vec<Scored>, usize, String) {
     let structures = structures();
-    let (chosen, name) =
-        match leave_one_out(model, parts, &structures, &HORIZONS_S, &ignore_progress) {
-            Ok(scored) => {
-                let chosen = scored.iter().position(|s| s.chosen).unwrap_or(0);
-                (chosen, structures[chosen].name.clone())
+    let of = |some: &[Structure]| leave_one_out(model, parts, some, &HORIZONS_S, &ignore_progress);
+    match of(&structures) {
+        Ok(scored) => {
+            let chosen = scored.iter().position(|s| s.chosen).unwrap_or(0);
+            for s in &scored {
+                eprintln!(
+                    "  LOO {:<40} {:.4} ± {:.4} {}",
+                    s.structure, s.mean, s.standard_error, s.chosen
+                );
             }
-            Err(why) => {
-                eprintln!("  no choice of the structure: {why}");
-                (TUNED, "tuned, without a choice".into())
-            }
-        };
-    let Fitted::Coefficients { per_flight, .. } = &structures[chosen].fitted else {
-        return (model.clone(), None, name);
+            (scored, chosen, structures[chosen].name.clone())
+        }
+        Err(why) => {
+            eprintln!("  no choice of the structure: {why}");
+            // the model as given can be combined where no part is long enough for a fit
+            let given = of(&structures[..1]).unwrap_or_default();
+            (given, TUNED, "tuned, without a choice".into())
+        }
+    }
+}
+
+/// `model` fitted to all of `fit` with the structure number `place`; as given if no fit is possible.
+fn fitted(model: &GreyBox, fit: &[Reconstruction], place: usize) -> GreyBox {
+    let structure = &structures()[place].fitted;
+    let of = |options: Options| match amend(model, fit, fit, &options, &ignore_progress) {
+        Ok(amended) => amended.model,
+        Err(why) => {
+            eprintln!("  no fit: {why}");
+            model.clone()
+        }
     };
-    match tuned(model, fit, Some(*per_flight)) {
-        Some(fitted) => (fitted, Some(*per_flight), name),
-        None => (model.clone(), None, "as given, for no fit was possible".into()),
+    match structure {
+        Fitted::Nothing | Fitted::LinearResidual => model.clone(),
+        Fitted::FromScratch => {
+            let per_flight = PerFlight { sensors: SensorErrors::Dropped, ..PerFlight::default() };
+            of(Options { prior: Prior::Bounds, per_flight, ..Options::default() })
+        }
+        Fitted::Coefficients { effects, per_flight } => of(Options {
+            effects: effects.clone(),
+            refused: Refused::Kept,
+            per_flight: *per_flight,
+            ..Options::default()
+        }),
     }
 }
 
@@ -263,13 +312,20 @@ fn tuned(
 
 /// An ARX forecast fitted to `seen`, with the order and the ridge that predict each of `parts` best from the others, and what
 /// these are. `scale` has the reference values of the states, in their units.
-fn chosen_arx(seen: &[Prepared], parts: &[Prepared], scale: [f64; 8]) -> (Option<Arx>, String) {
+fn chosen_arx(
+    seen: &[Prepared],
+    parts: &[Prepared],
+    scale: [f64; 8],
+) -> (Option<(Arx, Choice)>, String) {
     let choice = arx::choose(parts, scale, &HORIZONS_S).unwrap_or_else(|why| {
         eprintln!("  no choice of the order: {why}");
         Choice { order: 1, ridge: 0.0 }
     });
     match Arx::fit(seen, choice) {
-        Ok(arx) => (Some(arx), format!("ARX of order {}, ridge {:?}", choice.order, choice.ridge)),
+        Ok(arx) => (
+            Some((arx, choice)),
+            format!("ARX of order {}, ridge {:?}", choice.order, choice.ridge),
+        ),
         Err(why) => {
             eprintln!("  no ARX: {why}");
             (None, "no ARX".into())

@@ -8,7 +8,7 @@ use std::array::from_fn;
 
 use anyhow::Result;
 use greylag::model::GreyBox;
-use greylag::sysid::compare::arx::Arx;
+use greylag::sysid::compare::arx::{Arx, Choice};
 use greylag::sysid::compare::{forecast, scores};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use greylag::sysid::per_flight::{PerFlight, SensorErrors};
@@ -99,7 +99,7 @@ struct Rivals<'a> {
     bare: GreyBox,
     alone: Kind,
     /// ARX with its order in words; `None` if it cannot be fitted.
-    arx: (Option<Arx>, String),
+    arx: (Option<(Arx, Choice)>, String),
 }
 
 impl<'a> Rivals<'a> {
@@ -133,7 +133,7 @@ impl<'a> Rivals<'a> {
         let slowest = model.airframe.envelope.flying_from_mps();
         let unseen = [Prepared::new(&test[0], slowest)?];
         let arx = match &self.arx.0 {
-            Some(arx) => scaled(&arx.scores(&unseen, scale, &HORIZONS_S)?),
+            Some((arx, _)) => scaled(&arx.scores(&unseen, scale, &HORIZONS_S)?),
             None => [f64::NAN; HORIZONS_S.len()],
         };
         let hold = &forecast::on_unseen(&self.seen, &unseen, scale, &HORIZONS_S)[0];

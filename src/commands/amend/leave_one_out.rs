@@ -102,6 +102,15 @@ pub fn run(
         ),
         None => println!("No structure could be fitted with every flight left out once."),
     }
+    if let Some((structure, c)) =
+        scored.iter().find(|s| s.chosen).and_then(|s| Some((&s.structure, s.combined?)))
+    {
+        println!(
+            "Together with the state at the start of a run and the mean state, the error of {structure} on the flight left out is \
+             {:.4}; the model's weight is then {:.2} of 1.",
+            c.error, c.weight_of_model
+        );
+    }
     if let Some(path) = json {
         files::write(path, &(serde_json::to_string_pretty(&scored)? + "\n"), overwrite)?;
     }

@@ -13,6 +13,7 @@ use super::judge::{IMPROVED, Judge, judged, judged_at};
 use super::linear_residual;
 use super::output_error::{self, FitOptions};
 use super::parameters;
+use crate::compare::combination::{EVERY_S, Forecasts, choose as choose_weights, usual_state};
 use crate::compare::forecast;
 use crate::flight_path::reconstruction::Reconstruction;
 use crate::per_flight::known::put_right;
@@ -51,6 +52,15 @@ pub enum Fitted {
     FromScratch,
 }
 
+/// Cross-validation result of a structure together with the held and the mean state: see [`crate::compare::combination`].
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Combined {
+    /// Mean scaled error (dimensionless) over the flights, each with weights from the other flights.
+    pub error: f64,
+    /// Weight of the model, mean over the states, 0 to 1. A small weight says that the model is not to be trusted so far ahead.
+    pub weight_of_model: f64,
+}
+
 /// Cross-validation result of a structure.
 #[derive(Clone, Debug, Serialize)]
 pub struct Scored {
@@ -62,10 +72,15 @@ pub struct Scored {
     pub flights: Vec<String>,
     /// Error of each of `flights` with the fit to all other flights; NaN if the fit failed.
     pub errors: Vec<f64>,
+    /// For each of `flights` the model that was fitted to all other flights; `None` if the fit failed. Empty for a baseline.
+    #[serde(skip)]
+    pub models: Vec<Option<GreyBox>>,
     /// Mean of `errors`; infinite if one of them is NaN.
     pub mean: f64,
     /// Standard error of `mean`, from the scatter of `errors`.
     pub standard_error: f64,
+    /// The same model together with the held and the mean state; `None` for a baseline.
+    pub combined: Option<Combined>,
     /// Standard error of the mean difference from the best structure's errors, flight by flight. NaN for a baseline.
     pub beside_best: f64,
     /// Whether the structure is chosen: the simplest structure within one standard error of the best.
@@ -116,16 +131,21 @@ pub fn leave_one_out(
         let doing = format!("{}: leaving out one flight after the other", structure.name);
         report(progress, &doing, k as f64 / structures.len() as f64)?;
         let fitted = &structure.fitted;
-        let models = match (fitted, &tuned) {
+        let mut models = match (fitted, &tuned) {
             (Fitted::Nothing, _) => vec![Some(model.clone()); judges.len()],
             (Fitted::LinearResidual, Some(tuned)) => tuned.clone(),
             _ => fit(model, &set, fitted, &mut failed)?,
         };
         any_fit |= !matches!(fitted, Fitted::Nothing) && models.iter().any(Option::is_some);
-        all.push(scored(structure, free(model, fitted)?, set.errors(&models, fitted)));
         if fitted.tunes_only() {
-            tuned = Some(models);
+            tuned = Some(models.clone());
         }
+        if matches!(fitted, Fitted::LinearResidual) {
+            models = set.with_residuals(&models);
+        }
+        let combined = set.combined(&models);
+        let of = scored(structure, free(model, fitted)?, set.errors(&models));
+        all.push(Scored { models, combined, ..of });
     }
     // if no fit succeeded, the model as given would be chosen without a comparison
     if let Some(why) = failed.filter(|_| !any_fit) {
@@ -194,20 +214,37 @@ fn scores(
 }
 
 impl Set<'_> {
-    /// Error of each predicted flight with the model that was fitted to all other flights; NaN without a model. If `fitted` asks
-    /// for it, the model gets a linear residual.
-    fn errors(&self, models: &[Option<GreyBox>], fitted: &Fitted) -> Vec<f64> {
+    /// Error of each predicted flight with the model that was fitted to all other flights; NaN without a model.
+    fn errors(&self, models: &[Option<GreyBox>]) -> Vec<f64> {
         let one = |(left, model): (&usize, &Option<GreyBox>)| {
             let Some(model) = model else { return f64::NAN };
             let test = std::slice::from_ref(&self.judged[*left]);
-            let error =
-                |model: &GreyBox| judged(&scores(model, test, &[self.at])).unwrap_or(f64::NAN);
-            match fitted {
-                Fitted::LinearResidual => error(&corrected(model.clone(), self, *left)),
-                _ => error(model),
-            }
+            judged(&scores(model, test, &[self.at])).unwrap_or(f64::NAN)
         };
         self.judges.par_iter().zip(models).map(one).collect()
+    }
+
+    /// `models`, each with its linear residual.
+    fn with_residuals(&self, models: &[Option<GreyBox>]) -> Models {
+        let one = |(left, model): (&usize, &Option<GreyBox>)| {
+            Some(corrected(model.clone()?, self, *left))
+        };
+        self.judges.par_iter().zip(models).map(one).collect()
+    }
+
+    /// What `models` reach together with the held and the mean state. `None` if fewer than two flights have a model.
+    fn combined(&self, models: &[Option<GreyBox>]) -> Option<Combined> {
+        let one = |(left, model): (&usize, &Option<GreyBox>)| {
+            let others = self.judged.iter().enumerate().filter(|(k, _)| k != left);
+            let others: Vec<&Prepared> = others.map(|(_, f)| &f.prepared).collect();
+            let of = usual_state(others);
+            let flight = &self.judged[*left].prepared;
+            Some(Forecasts::of_model(model.as_ref()?, flight, &[self.at], EVERY_S, None, of))
+        };
+        let parts: Vec<Forecasts> = self.judges.par_iter().zip(models).filter_map(one).collect();
+        let chosen = choose_weights(&parts)?;
+        let weight_of_model = chosen.combination.of_model()[0];
+        Some(Combined { error: chosen.error, weight_of_model })
     }
 }
 
@@ -293,14 +330,15 @@ fn scored(structure: &Structure, free: usize, errors: Vec<f64>) -> Scored {
     let [mean, standard_error] = mean_with_error(&errors);
     let mean = if mean.is_nan() { f64::INFINITY } else { mean };
     let structure = structure.name.clone();
-    let flights = Vec::new();
     Scored {
         structure,
         free,
-        flights,
+        flights: Vec::new(),
         errors,
+        models: Vec::new(),
         mean,
         standard_error,
+        combined: None,
         beside_best: f64::NAN,
         chosen: false,
     }
@@ -335,66 +373,4 @@ fn choose(all: &mut [Scored]) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::flight_path::reconstruction::{Instant, Segment};
-    use crate::progress::ignore_progress;
-    use greylag_physics::{Controls, State};
-
-    /// A flight of 3 s without motion.
-    fn short(name: &str) -> Reconstruction {
-        let instant = |k: usize| Instant {
-            time_s: 0.01 * k as f64,
-            state: State::NEUTRAL,
-            yaw: f64::NAN,
-            controls: Controls::default(),
-            command: None,
-            specific_force: [f64::NAN; 3],
-            altitude: 600.0,
-            density: 1.225,
-        };
-        Reconstruction {
-            segments: vec![Segment { instants: (0..301).map(instant).collect() }],
-            noise: [1e-3; 8],
-            left: [1e-3; 8],
-            force_noise: [0.1; 3],
-            ..Reconstruction::empty(name)
-        }
-    }
-
-    #[test]
-    fn the_model_as_given_is_not_chosen_where_no_fit_was_possible() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../params/x8/jsbsim.toml");
-        let model = GreyBox::load(std::path::Path::new(path)).unwrap();
-        let flights = ["a", "b", "c"].map(short);
-        let tuned = Fitted::Coefficients { effects: Vec::new(), per_flight: PerFlight::default() };
-        let structures = [("given", Fitted::Nothing), ("tuned", tuned)]
-            .map(|(name, fitted)| Structure { name: name.into(), fitted });
-        let why = leave_one_out(&model, &flights, &structures, &[1.0], &ignore_progress);
-        // two flights of 3 s are shorter than the 10 s that a fit needs
-        assert!(matches!(why, Err(AmendError::TooLittle { .. })), "{why:?}");
-    }
-
-    fn of(name: &str, free: usize, errors: &[f64]) -> Scored {
-        let structure = Structure { name: name.into(), fitted: Fitted::Nothing };
-        scored(&structure, free, errors.to_vec())
-    }
-
-    #[test]
-    fn the_simplest_within_one_standard_error_is_chosen() {
-        let mut all = [
-            of("given", 0, &[0.5, 0.6, 0.4]),
-            of("tuned", 20, &[0.20, 0.31, 0.24]),
-            of("more", 30, &[0.21, 0.28, 0.25]),
-            of("failed", 5, &[0.1, f64::NAN, 0.1]),
-        ];
-        choose(&mut all);
-        // mean errors 0.2500 and 0.2467: the mean difference of 0.003 has a standard error of 0.014
-        assert_eq!(all.map(|s| s.chosen), [false, true, false, false]);
-        // significantly better in each flight, although the errors differ much more between the flights than between the
-        // structures
-        let mut all = [of("tuned", 20, &[0.20, 0.30, 0.40]), of("more", 30, &[0.10, 0.21, 0.29])];
-        choose(&mut all);
-        assert_eq!(all.map(|s| s.chosen), [false, true]);
-    }
-}
+mod tests;

@@ -23,7 +23,7 @@ mod parameters;
 mod quick;
 mod result;
 #[cfg(test)]
-mod sample;
+pub(crate) mod sample;
 mod shooting;
 mod story;
 

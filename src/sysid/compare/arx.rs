@@ -185,6 +185,11 @@ impl Arx {
         Ok(forecast::scores(&Forecast::Linear(self.clone()), flights, scale, horizons_s))
     }
 
+    /// Checks that the sample time of `flight` is that of the fit.
+    pub(super) fn sampled_as(&self, flight: &Prepared) -> Result<(), ArxError> {
+        same_steps(self.substeps, std::slice::from_ref(flight))
+    }
+
     /// The state at `dt` (s) after the present state. `past` holds the present state and those before it, the newest first.
     /// `flown` holds the samples of the segment up to the present one.
     pub(super) fn next(&self, past: &[[f64; 8]], flown: &[Instant], dt: f64) -> [f64; 8] {

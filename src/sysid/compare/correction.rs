@@ -1,5 +1,5 @@
 //! Corrections of free runs. A correction is an additional term in the model's rates. It is a disturbance that an observer
-//! estimated before the run, or a linear function of states and deflections (a linear residual).
+//! estimated before the run, a linear function of states and deflections (a linear residual), or a pull towards the start.
 
 use greylag_model::{GreyBox, Memory};
 
@@ -21,6 +21,16 @@ pub struct Observer {
     pub past_s: f64,
     /// Time constant with which the disturbance decays during the run, s; infinite for a constant disturbance.
     pub decay_s: f64,
+}
+
+/// A pull of attitude and airspeed towards the state at the start of a run, as of a controller that holds them: −(x − x₀)/τ is
+/// added to their rates. Slow errors of the model then do not grow with the integration; fast motion is hardly changed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pull {
+    /// Time constant τ for roll and pitch angle, s; infinite for no pull.
+    pub attitude_s: f64,
+    /// Time constant τ for the airspeed, s; infinite for no pull.
+    pub airspeed_s: f64,
 }
 
 /// Disturbance during one run, estimated from the samples before its start.
@@ -75,6 +85,8 @@ pub enum Correction<'a> {
     Observer(Observer),
     /// A linear residual from [`Arx::of_residual`].
     Linear(&'a Arx),
+    /// A pull towards the start of each run.
+    Pull(Pull),
 }
 
 /// A [`Correction`] during one run.
@@ -84,6 +96,11 @@ pub(super) enum Acting<'a> {
         arx: &'a Arx,
         /// Predicted and, before the start of the run, measured states, the newest first.
         past: Vec<[f64; 8]>,
+    },
+    Pull {
+        pull: Pull,
+        /// The state at the start of the run.
+        from: [f64; 8],
     },
 }
 
@@ -120,6 +137,7 @@ impl<'a> Correction<'a> {
             Correction::Linear(arx) => {
                 Acting::Linear { arx, past: arx::past(segment, start, arx.order()) }
             }
+            Correction::Pull(pull) => Acting::Pull { pull, from: segment[start].state.to_array() },
         }
     }
 }
@@ -129,6 +147,7 @@ impl Acting<'_> {
     pub(super) fn act(&mut self, next: &mut [f64; 8], flown: &[Instant], dt: f64) {
         match self {
             Acting::Disturbance(disturbance) => disturbance.act(next, dt),
+            Acting::Pull { pull, from } => pull.act(next, from, dt),
             Acting::Linear { arx, past } => {
                 let rates = arx.rates(past, flown);
                 next.iter_mut().zip(rates.iter()).for_each(|(x, rate)| *x += dt * rate);
@@ -141,6 +160,18 @@ impl Acting<'_> {
     }
 }
 
+impl Pull {
+    /// Pulls a predicted state towards the state `from` over one sampling interval `dt`, s.
+    fn act(&self, state: &mut [f64; 8], from: &[f64; 8], dt: f64) {
+        let away = error(from, state);
+        for (k, tau_s) in
+            [self.attitude_s, self.attitude_s, self.airspeed_s].into_iter().enumerate()
+        {
+            state[k] += away[k] * (-dt / tau_s).exp_m1();
+        }
+    }
+}
+
 impl Disturbance {
     /// Adds the disturbance to a predicted state over one sampling interval `dt`, s, and lets it decay.
     fn act(&mut self, state: &mut [f64; 8], dt: f64) {
@@ -148,5 +179,26 @@ impl Disturbance {
             *x += dt * *rate;
             *rate *= self.keep;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pull_lets_a_departure_decay_with_its_time_constant() {
+        let pull = Pull { attitude_s: 2.0, airspeed_s: f64::INFINITY };
+        // a roll of 179° and one of −179° are 2° apart
+        let mut from = [0.0; 8];
+        from[0] = 179_f64.to_radians();
+        let mut state = [0.1; 8];
+        state[0] = -179_f64.to_radians();
+        for _ in 0..200 {
+            pull.act(&mut state, &from, 0.01);
+        }
+        let left = (-1.0_f64).exp();
+        assert!((error(&from, &state)[0] - 2_f64.to_radians() * left).abs() < 1e-9, "{state:?}");
+        assert!((state[1] - 0.1 * left).abs() < 1e-12 && state[2..] == [0.1; 6], "{state:?}");
     }
 }

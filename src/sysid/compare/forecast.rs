@@ -5,8 +5,9 @@ use serde::Serialize;
 
 use super::answer::ANSWER_S;
 use super::arx::{self, Arx};
-use super::free_run::{DIVERGENCE_BOUND, Look, Runs, START_EVERY_S, error, scaled};
+use super::free_run::{End, START_EVERY_S};
 use super::result::HorizonScore;
+use super::runs::{Ahead, Look, Runs};
 use crate::flight_path::reconstruction::{Instant, Reconstruction};
 use crate::weak_form::prepared::{ClockError, Prepared};
 use greylag_model::GreyBox;
@@ -62,29 +63,33 @@ impl Forecast {
     }
 
     /// Makes one run from sample `start` of `segment`. Returns the measured and the predicted state after each number of steps in
-    /// `looks` that the segment reaches; `None` once the run has diverged. Errors are divided by `scale` to detect this.
+    /// `looks` that the segment reaches; `None` once the run has diverged. It ends early as `end` says, with the distances divided
+    /// by `scale`.
     pub(super) fn run(
         &self,
         segment: &[Instant],
         dt: f64,
         start: usize,
         looks: &[usize],
-        scale: &[f64; 8],
+        (scale, end): (&[f64; 8], End),
     ) -> Vec<Look> {
         let mut past = arx::past(segment, start, self.order());
+        let from = past[0];
         let (mut seen, mut lost) = (Vec::new(), false);
         let reached = looks.iter().filter(|l| start + **l < segment.len());
         let mut at = start;
         for look in reached {
             while at < start + look && !lost {
                 let next = self.next(&past, &segment[..=at], dt);
-                past.rotate_right(1);
-                past[0] = next;
                 at += 1;
-                let miss = scaled(&error(&segment[at].state.to_array(), &next), scale);
-                lost = miss.is_nan() || miss > DIVERGENCE_BOUND;
+                lost = !end.goes_on(&from, &segment[at].state.to_array(), &next, scale);
+                if !lost {
+                    past.rotate_right(1);
+                    past[0] = next;
+                }
             }
-            seen.push((!lost).then(|| [segment[at].state.to_array(), past[0]]));
+            let pair = [segment[start + look].state.to_array(), past[0]];
+            seen.push((!lost || end == End::Far).then_some(pair));
         }
         seen
     }
@@ -175,12 +180,45 @@ fn flown(
     scale: [f64; 8],
     horizons: &[f64],
 ) -> Vec<Vec<Look>> {
-    let every = ((START_EVERY_S / flight.dt).round() as usize).max(1);
-    let looks: Vec<usize> =
-        horizons.iter().map(|t| ((t / flight.dt).round() as usize).max(1)).collect();
+    let all = starts_and_runs(forecast, flight, horizons, START_EVERY_S, (&scale, End::Wrong));
+    all.into_iter().map(|(_, looks)| looks).collect()
+}
+
+/// The runs of `forecast` along one flight from starts every `every_s` (s) to each of `horizons_s` (s) that is recorded. They end
+/// as [`End::Far`] says, with distances divided by `scale`.
+pub(super) fn ahead(
+    forecast: &Forecast,
+    flight: &Prepared,
+    scale: [f64; 8],
+    horizons_s: &[f64],
+    every_s: f64,
+) -> Vec<Ahead> {
+    let all = starts_and_runs(forecast, flight, horizons_s, every_s, (&scale, End::Far));
+    let one = |(from, looks): ([f64; 8], Vec<Look>)| Ahead {
+        from,
+        pairs: looks.into_iter().flatten().collect(),
+    };
+    all.into_iter().map(one).collect()
+}
+
+/// The first state and the looks of each run of `forecast` along one flight, from starts every `every_s` (s). The last argument has
+/// the scale of the states and says where a run ends early.
+fn starts_and_runs(
+    forecast: &Forecast,
+    flight: &Prepared,
+    horizons_s: &[f64],
+    every_s: f64,
+    ends: (&[f64; 8], End),
+) -> Vec<([f64; 8], Vec<Look>)> {
+    let steps = |time_s: f64| ((time_s / flight.dt).round() as usize).max(1);
+    let looks: Vec<usize> = horizons_s.iter().map(|h| steps(*h)).collect();
     let of = |segment: &Vec<Instant>| {
-        let starts = (0..segment.len() - 1).step_by(every);
-        starts.map(|s| forecast.run(segment, flight.dt, s, &looks, &scale)).collect::<Vec<_>>()
+        let starts = (0..segment.len() - 1).step_by(steps(every_s));
+        let run = |start: usize| {
+            let from = segment[start].state.to_array();
+            (from, forecast.run(segment, flight.dt, start, &looks, ends))
+        };
+        starts.map(run).collect::<Vec<_>>()
     };
     flight.segments.iter().flat_map(of).collect()
 }

@@ -6,12 +6,12 @@ use std::f64::consts::{PI, TAU};
 use rayon::prelude::*;
 
 use super::correction::{Acting, Correction};
-use super::result::{GrowthPoint, HorizonScore, StateScore};
+pub use super::runs::Runs;
+use super::runs::{Ahead, Look};
 use crate::flight_path::reconstruction::Instant;
 use crate::per_flight::known::KnownFlight;
 use crate::weak_form::prepared::Prepared;
 use greylag_model::{GreyBox, Memory};
-use greylag_num::statistics::{mean, quantile};
 use greylag_physics::State;
 
 /// Time between the starts of two free runs, s.
@@ -21,18 +21,6 @@ pub const START_EVERY_S: f64 = 3.0;
 pub const DIVERGENCE_BOUND: f64 = 1.0;
 /// Number of points of the growth curve, which shows the error over the time since the start of a run.
 pub const GROWTH_POINTS: usize = 25;
-
-/// Measured and predicted state of a run at one time; `None` once the run has diverged.
-pub(super) type Look = Option<[[f64; 8]; 2]>;
-
-/// All free runs of a model over all flights.
-pub struct Runs {
-    /// Times at which the errors are evaluated, s after the start of a run, ascending.
-    times: Vec<f64>,
-    /// For each run: its states at `times`, up to the end of its segment (stretch of a flight without gaps).
-    runs: Vec<Vec<Look>>,
-    scale: [f64; 8],
-}
 
 /// The predicted states of free runs that restart every [`START_EVERY_S`], one list for each state. The times are those of
 /// [`FlightTrace`](super::result::FlightTrace), the order and the units those of `State::NAMES`.
@@ -124,7 +112,7 @@ fn fly_one(
                 .par_iter()
                 .map(|&start| {
                     let acting = correction.map(|c| c.from(&model, flight, segment, start));
-                    let wanted = Wanted { looks: &looks, keep: every };
+                    let wanted = Wanted { looks: &looks, keep: every, end: End::Wrong };
                     run(&model, flight, segment, start, wanted, acting)
                 })
                 .collect();
@@ -143,6 +131,36 @@ fn fly_one(
         }
     }
     (runs, trace)
+}
+
+/// Free runs of `model` along one flight, from starts every `every_s` (s) to each of `horizons_s` (s) that is recorded, with the
+/// model's rates corrected by `correction`. They end as [`End::Far`] says.
+pub(super) fn ahead(
+    model: &GreyBox,
+    flight: &Prepared,
+    horizons_s: &[f64],
+    every_s: f64,
+    correction: Option<Correction>,
+) -> Vec<Ahead> {
+    let known = KnownFlight::of(model, flight);
+    let (with, right) = known.as_ref().map_or((model, flight), |k| (&k.model, &k.flight));
+    let flight = &*right.acting(with);
+    let model = &flight.stepping(with);
+    let steps = |time_s: f64| ((time_s / flight.dt).round() as usize).max(1);
+    let looks: Vec<usize> = horizons_s.iter().map(|h| steps(*h)).collect();
+    let measured = |state: [f64; 8]| known.as_ref().map_or(state, |known| known.as_measured(state));
+    let from = |segment: &[Instant], start: usize| {
+        let acting = correction.map(|c| c.from(model, flight, segment, start));
+        let wanted = Wanted { looks: &looks, keep: 1, end: End::Far };
+        let (seen, _) = run(model, flight, segment, start, wanted, acting);
+        let pairs = seen.into_iter().flatten().map(|pair| pair.map(measured)).collect();
+        Ahead { from: measured(segment[start].state.to_array()), pairs }
+    };
+    let of = |segment: &Vec<Instant>| {
+        let starts: Vec<usize> = (0..segment.len() - 1).step_by(steps(every_s)).collect();
+        starts.par_iter().map(|start| from(segment, *start)).collect::<Vec<_>>()
+    };
+    flight.segments.iter().flat_map(of).collect()
 }
 
 /// Largest number of runs whose paths are in memory before they are appended to the trace.
@@ -171,7 +189,7 @@ pub fn from_moment(model: &GreyBox, flight: &Prepared, time_s: f64, seconds: f64
     let segment = flight.segments.iter().find(inside)?;
     let start = segment.partition_point(|i| i.time_s < time_s - 0.5 * flight.dt);
     let keep = ((seconds / flight.dt).round() as usize).max(1) + 1;
-    let wanted = Wanted { looks: &[], keep };
+    let wanted = Wanted { looks: &[], keep, end: End::Wrong };
     let (_, rows) = run(&flight.stepping(model), flight, segment, start, wanted, None);
     let mut path = Path::default();
     for (instant, row) in segment[start..].iter().zip(rows) {
@@ -190,6 +208,34 @@ struct Wanted<'a> {
     looks: &'a [usize],
     /// Number of samples, the first included, of which the predicted state is returned.
     keep: usize,
+    /// Where the run ends early.
+    end: End,
+}
+
+/// Where a run ends early. Both distances are scaled as errors are, and bounded by [`DIVERGENCE_BOUND`].
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum End {
+    /// Where it is far from the measurements: it has diverged.
+    Wrong,
+    /// Where it is far from its start, which is known without a measurement. The last state before that is then held.
+    Far,
+}
+
+impl End {
+    /// Whether a run from the state `from` goes on with the state `predicted`, where `measured` was measured.
+    pub(super) fn goes_on(
+        self,
+        from: &[f64; 8],
+        measured: &[f64; 8],
+        predicted: &[f64; 8],
+        scale: &[f64; 8],
+    ) -> bool {
+        let near = match self {
+            End::Wrong => measured,
+            End::Far => from,
+        };
+        scaled(&error(near, predicted), scale) <= DIVERGENCE_BOUND
+    }
 }
 
 /// Integrates one run from sample `start`. Returns what is [`Wanted`]: the pairs of measured and predicted state, and the
@@ -199,7 +245,7 @@ fn run(
     flight: &Prepared,
     segment: &[Instant],
     start: usize,
-    Wanted { looks, keep }: Wanted,
+    Wanted { looks, keep, end }: Wanted,
     mut correction: Option<Acting>,
 ) -> (Vec<Look>, Vec<[f64; 8]>) {
     let scale = model.scale();
@@ -217,25 +263,25 @@ fn run(
     let mut seen = Vec::new();
     let mut path = vec![state.to_array()];
     for i in start..last.max((start + keep).min(segment.len()) - 1) {
+        let before = state.to_array();
         state = advance(i, state, &mut memory);
         if let Some(correction) = &mut correction {
             let mut next = state.to_array();
             correction.act(&mut next, &segment[..=i], flight.dt);
             state = State::from_array(next);
         }
-        let measured = segment[i + 1].state.to_array();
-        let error = error(&measured, &state.to_array());
-        let good = scaled(&error, &scale) <= DIVERGENCE_BOUND;
-        if path.len() < keep && good {
-            path.push(state.to_array());
+        let (measured, next) = (segment[i + 1].state.to_array(), state.to_array());
+        if !end.goes_on(&path[0], &measured, &next, &scale) {
+            let rest = looks.iter().filter(|l| start + *l < segment.len()).skip(seen.len());
+            let held = |l: &usize| [segment[start + l].state.to_array(), before];
+            seen.extend(rest.map(|l| (end == End::Far).then(|| held(l))));
+            break;
+        }
+        if path.len() < keep {
+            path.push(next);
         }
         for _ in looks.iter().filter(|l| **l == i + 1 - start) {
-            seen.push(good.then(|| [measured, state.to_array()]));
-        }
-        if !good {
-            let reached = looks.iter().filter(|l| start + *l < segment.len()).count();
-            seen.resize(reached, None);
-            break;
+            seen.push(Some([measured, next]));
         }
     }
     (seen, path)
@@ -254,101 +300,6 @@ pub(super) fn scaled(error: &[f64; 8], scale: &[f64; 8]) -> f64 {
     (error.iter().zip(scale).map(|(e, x)| (e / x).powi(2)).sum::<f64>() / 8.0).sqrt()
 }
 
-impl Runs {
-    /// Combines `runs`, which are evaluated at the `times` (s). `scale` is the scale x_c of each state.
-    pub(super) fn new(times: Vec<f64>, runs: Vec<Vec<Look>>, scale: [f64; 8]) -> Runs {
-        Runs { times, runs, scale }
-    }
-
-    fn at(&self, time: f64) -> Vec<Look> {
-        let place = self.times.iter().position(|t| (t - time).abs() < 1e-9);
-        place.map_or(Vec::new(), |k| self.runs.iter().filter_map(|r| r.get(k).copied()).collect())
-    }
-
-    /// Scaled errors of `looks`, the states of all runs at one time. The error of a diverged run is [`DIVERGENCE_BOUND`].
-    fn errors(&self, looks: &[Look]) -> Vec<f64> {
-        let one = |look: &Look| match look {
-            Some([measured, predicted]) => scaled(&error(measured, predicted), &self.scale),
-            None => DIVERGENCE_BOUND,
-        };
-        looks.iter().map(one).collect()
-    }
-
-    /// Scaled error of each run at `horizon_s` (s), one of the evaluated times. The error of a diverged run is
-    /// [`DIVERGENCE_BOUND`].
-    pub fn scaled_errors(&self, horizon_s: f64) -> Vec<f64> {
-        self.errors(&self.at(horizon_s))
-    }
-
-    /// The errors over all runs at `horizon_s` (s), one of the evaluated times.
-    pub fn score(&self, horizon_s: f64) -> HorizonScore {
-        let looks = self.at(horizon_s);
-        let diverged = looks.iter().filter(|l| l.is_none()).count();
-        let whole: Vec<[[f64; 8]; 2]> = looks.iter().flatten().copied().collect();
-        HorizonScore {
-            horizon_s,
-            runs: looks.len(),
-            diverged,
-            divergence_rate: diverged as f64 / looks.len() as f64,
-            rmse_scaled: root_mean_square(&self.errors(&looks)),
-            states: (0..8).map(|k| self.state_score(k, &whole)).collect(),
-        }
-    }
-
-    /// The growth of the error with time.
-    pub fn growth(&self) -> Vec<GrowthPoint> {
-        let point = |&time_s: &f64| {
-            let looks = self.at(time_s);
-            let errors = self.errors(&looks);
-            GrowthPoint {
-                time_s,
-                runs: looks.len(),
-                diverged: looks.iter().filter(|l| l.is_none()).count(),
-                rmse_scaled: root_mean_square(&errors),
-                median_scaled: quantile(&errors, 0.5),
-                p90_scaled: quantile(&errors, 0.9),
-            }
-        };
-        self.times.iter().map(point).filter(|p| p.runs > 0).collect()
-    }
-
-    /// RMSE, R², Theil's U and Theil's proportions for state number `k`.
-    fn state_score(&self, k: usize, runs: &[[[f64; 8]; 2]]) -> StateScore {
-        let measured: Vec<f64> = runs.iter().map(|r| r[0][k]).collect();
-        // the error is wrapped, so that a measured roll of 179° and a predicted one of −179° differ by 2°
-        let predicted: Vec<f64> = runs.iter().map(|r| r[0][k] + error(&r[0], &r[1])[k]).collect();
-        let errors: Vec<f64> = predicted.iter().zip(&measured).map(|(a, b)| a - b).collect();
-        let rmse = root_mean_square(&errors);
-        let (mean_a, mean_b) = (mean(&predicted), mean(&measured));
-        let (sd_a, sd_b) = (deviation(&predicted, mean_a), deviation(&measured, mean_b));
-        let bias = (mean_a - mean_b).powi(2) / (rmse * rmse);
-        let variance = (sd_a - sd_b).powi(2) / (rmse * rmse);
-        StateScore {
-            state: State::NAMES[k],
-            rmse,
-            rmse_scaled: rmse / self.scale[k],
-            r2: 1.0 - (rmse / sd_b).powi(2),
-            theil_u: rmse / (root_mean_square(&predicted) + root_mean_square(&measured)),
-            bias_share: bias,
-            variance_share: variance,
-            covariance_share: at_least_zero(1.0 - bias - variance),
-        }
-    }
-}
-
-/// Returns `x`, or 0 if `x` is negative. A NaN stays NaN, which `f64::max` would replace by 0.
-fn at_least_zero(x: f64) -> f64 {
-    if x < 0.0 { 0.0 } else { x }
-}
-
-fn root_mean_square(x: &[f64]) -> f64 {
-    (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt()
-}
-
-fn deviation(x: &[f64], mean: f64) -> f64 {
-    (x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / x.len() as f64).sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -362,38 +313,5 @@ mod tests {
                 "b: its samples are 0.200 s apart, so its error at the horizon 0.05 s is that at 0.200 s"
             ]
         );
-    }
-
-    #[test]
-    fn theils_shares_of_known_errors() {
-        let runs = |f: fn(f64) -> f64| Runs {
-            times: vec![1.0],
-            scale: [1.0; 8],
-            runs: [-0.4, -0.1, 0.2, 0.3].map(|x: f64| vec![Some([[x; 8], [f(x); 8]])]).to_vec(),
-        };
-        let offset = runs(|x| x + 0.1).score(1.0);
-        let s = &offset.states[1];
-        assert!((s.rmse - 0.1).abs() < 1e-12 && (s.bias_share - 1.0).abs() < 1e-9);
-        // the prediction is twice the measured value: the RMSE equals the RMS of the measured values, so U = 1/(2 + 1)
-        let doubled = runs(|x| 2.0 * x).score(1.0);
-        let s = &doubled.states[1];
-        assert!((s.theil_u - 1.0 / 3.0).abs() < 1e-12 && (s.variance_share - 1.0).abs() < 1e-9);
-        assert_eq!(offset.divergence_rate, 0.0);
-    }
-
-    #[test]
-    fn a_diverged_run_counts_with_the_bound() {
-        let exact = Some([[0.1; 8]; 2]);
-        let runs = Runs { times: vec![1.0], scale: [1.0; 8], runs: vec![vec![exact], vec![None]] };
-        let score = runs.score(1.0);
-        assert_eq!((score.runs, score.diverged, score.divergence_rate), (2, 1, 0.5));
-        assert!((score.rmse_scaled - DIVERGENCE_BOUND / 2_f64.sqrt()).abs() < 1e-12);
-        assert_eq!(score.states[2].rmse, 0.0);
-        // Theil's proportions of a zero error are not defined
-        let s = &score.states[2];
-        assert!(s.bias_share.is_nan() && s.variance_share.is_nan() && s.covariance_share.is_nan());
-        // a roll of 179° predicted as −179° has an error of 2°
-        let e = error(&[179_f64.to_radians(); 8], &[-179_f64.to_radians(); 8]);
-        assert!((e[0] - 2_f64.to_radians()).abs() < 1e-9);
     }
 }
