@@ -21,6 +21,11 @@ pub fn gust_kept(step: f64) -> f64 {
     (-step / GUST_TIME).exp()
 }
 
+/// Standard deviation of the part of a gust with the standard deviation `level` (m/s) that is new after the time `step` (s), m/s.
+pub fn gust_deviation(level: f64, step: f64) -> f64 {
+    level * (1.0 - gust_kept(step).powi(2)).sqrt()
+}
+
 /// Mean body rates and specific forces over each interval between samples, from gyros and accelerometers.
 #[derive(Clone, Debug)]
 pub struct Drive {

@@ -21,6 +21,10 @@ use crate::flight_path::path::Path;
 /// of them.
 const COARSE: [f64; 4] = [0.02, 0.1, 0.5, 2.0];
 const FINE: [f64; 3] = [2.0, 1.4, 1.2];
+/// Gusts of more than this standard deviation (m/s) feign errors of the air-data sensors. The level belongs to the correlation time
+/// of [`gust_kept`](crate::flight_path::kinematics::gust_kept): gusts of 0.14 m/s over 1.5 s change as fast. With a right gain of a
+/// vane that errs, and with a right delay in place of a lag, the level stays below 0.2 m/s.
+const FEIGNING: f64 = 0.5;
 /// Residuals beyond this number of standard deviations are down-weighted.
 const BOUND: f64 = 4.0;
 /// Number of iterations with gusts.
@@ -51,14 +55,35 @@ pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
     };
     start(&mut found, problem);
     calm(problem, &mut found, 0)?;
+    let (as_usual, before) = (*problem, found.clone());
     let problem = &mut problem.clone();
-    while let Some((place, width)) = calibration::next(problem, &found, BOUND) {
+    free(problem, &mut found, &[])?;
+    let mut rough = rough(problem, &found, &singular)?;
+    let blown = rough.as_ref().is_some_and(|trial| trial.levels.gusts > FEIGNING);
+    if blown && calibration::freed_of_air(&before.widths, &found.widths) {
+        (*problem, found) = (as_usual, before);
+        free(problem, &mut found, &calibration::OF_AIR)?;
+        rough = self::rough(problem, &found, &singular)?;
+    }
+    if let Some(trial) = rough {
+        gusty(problem, &mut found, trial, &singular)?;
+    }
+    Ok(found)
+}
+
+/// Gives rare errors of the sensors a wide prior where the data ask for it, and fits again after each one. The constants `held`
+/// keep their priors.
+fn free(
+    problem: &mut Problem,
+    found: &mut Found,
+    held: &[usize],
+) -> Result<(), ReconstructError> {
+    while let Some((place, width)) = calibration::next(problem, found, BOUND, held) {
         problem.widths[place] = width;
         found.widths = problem.widths;
-        calm(problem, &mut found, FIRST)?;
+        calm(problem, found, FIRST)?;
     }
-    gusty(problem, &mut found, &singular)?;
-    Ok(found)
+    Ok(())
 }
 
 /// Fits motion and constants without gusts. The iterations are numbered from `from`.
@@ -108,15 +133,16 @@ fn search(
     Ok(0.0)
 }
 
-/// Estimates gusts along the path if the data make gusts more likely than white noise of the air-data sensors.
-fn gusty(
+/// `found` with the most likely level of the gusts. `None` if the data do not make gusts more likely than white noise of the
+/// air-data sensors.
+fn rough(
     problem: &Problem,
-    found: &mut Found,
+    found: &Found,
     singular: &dyn Fn() -> ReconstructError,
-) -> Result<(), ReconstructError> {
+) -> Result<Option<Found>, ReconstructError> {
     // if a vane is missing, a filter or a delay of the airspeed sensor would be mistaken for vertical gusts
     if !(problem.log.has.alpha && problem.log.has.beta) {
-        return Ok(());
+        return Ok(None);
     }
     let mut trial = found.clone();
     for channel in 3..6 {
@@ -124,9 +150,16 @@ fn gusty(
         trial.levels.colour[channel] = 1.0;
     }
     trial.levels.gusts = likeliest_gusts(problem, &trial).ok_or_else(singular)?;
-    if trial.levels.gusts <= CALM {
-        return Ok(());
-    }
+    Ok(Some(trial).filter(|trial| trial.levels.gusts > CALM))
+}
+
+/// Estimates gusts along the path with the levels of `trial`, which is `found` with gusts.
+fn gusty(
+    problem: &Problem,
+    found: &mut Found,
+    mut trial: Found,
+    singular: &dyn Fn() -> ReconstructError,
+) -> Result<(), ReconstructError> {
     let deviations = gusts::deviations(problem, found, &trial, BOUND).ok_or_else(singular)?;
     for _ in 0..GUSTY {
         let solved = problem.held(&trial, BOUND).ok_or_else(singular)?;

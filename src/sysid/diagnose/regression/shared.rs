@@ -23,22 +23,30 @@ pub type PathError = [[f64; 2]; 3];
 
 /// Computes the path errors of a flight with the sampling interval `dt` (s), for a steady-state smoother.
 ///
-/// The smoother combines the measured value with the integrated rates. Let R be the variance of the measurement and q
-/// the variance of an integration step. The smoother's memory is then √(R/q) samples to either side.
+/// The smoother combines the measured value with a prediction from the sample before: rates are integrated, and a gust keeps its
+/// value. Let R be the variance of the measurement and Q that of the prediction's step. The weight decreases by the factor z from
+/// one sample to the next, with z + 1/z = 2 + Q/R (the smoother of a random walk). In gusts the memory is a few samples, so that
+/// far more of the vanes' noise is left.
 pub fn path_error(flight: &Reconstruction, dt: f64) -> PathError {
     let [fx, fy, fz] = flight.force_noise.map(|x| if x.is_finite() { x } else { 0.0 });
     let [_, _, v, p, q, r, alpha, beta] = flight.noise.map(|x| if x.is_finite() { x } else { 0.0 });
     let speeds = flight.segments.iter().flat_map(|s| s.instants.iter().map(|i| i.state.airspeed));
     let (sum, count) = speeds.fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
     let speed: f64 = if count > 0.0 { sum / count } else { 1.0 };
-    let of = |measured: f64, rate: f64| {
-        if measured <= 0.0 || rate <= 0.0 {
+    let gust = flight.gust_step * (dt / flight.step_s).sqrt();
+    let of = |measured: f64, step: f64| {
+        if measured <= 0.0 || step <= 0.0 {
             [0.0, 0.0]
         } else {
-            [measured, (-rate * dt / measured).exp()]
+            let ratio = step / measured;
+            [measured, 1.0 + 0.5 * ratio * ratio - ratio * (1.0 + 0.25 * ratio * ratio).sqrt()]
         }
     };
-    [of(v, fx), of(alpha, (fz / speed).hypot(q)), of(beta, (fy / speed).hypot(r).hypot(0.1 * p))]
+    [
+        of(v, (fx * dt).hypot(gust)),
+        of(alpha, ((fz / speed).hypot(q) * dt).hypot(gust / speed)),
+        of(beta, ((fy / speed).hypot(r).hypot(0.1 * p) * dt).hypot(gust / speed)),
+    ]
 }
 
 /// Returns `flight` with additional simulated noise of inertial sensors, vanes and airspeed. The noise of the path is filtered

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use super::{Found, Problem};
 use crate::flight_path::band::{self, Link, Node, add_gram, add_upper_gram};
 use crate::flight_path::intake::Track;
-use crate::flight_path::kinematics::{Drive, MOTION, Step, gust_kept};
+use crate::flight_path::kinematics::{Drive, MOTION, Step, gust_deviation};
 use crate::flight_path::levels::Levels;
 use crate::flight_path::measurement::{self, Others, Reading};
 use crate::flight_path::nuisance::Values;
@@ -103,7 +103,7 @@ impl<const N: usize, const W: usize, const M: usize, const D: usize> band::Equat
 
 /// Standard deviations of the residuals of a kinematic step over `step` (s): attitude (rad), velocity (m/s), gust (m/s).
 pub fn step_deviations<const N: usize>(levels: &Levels, step: f64) -> [f64; N] {
-    let gust = levels.gusts * (1.0 - gust_kept(step).powi(2)).sqrt();
+    let gust = gust_deviation(levels.gusts, step);
     std::array::from_fn(|i| match i {
         0..3 => levels.gyro[i] * step,
         3..MOTION => levels.force[i - 3] * step,
