@@ -10,7 +10,7 @@
 use crate::flight_path::equations::{Found, Problem};
 use crate::flight_path::nuisance::{
     self, AIRSPEED_OFFSET, COUNT, HEADING, SKEW_AIRSPEED, SKEW_ATTITUDE, SKEW_FORCE, SKEW_VANES,
-    SKEW_VELOCITY, VANE_GAIN, Values,
+    SKEW_VELOCITY, VANE_GAIN,
 };
 
 /// Number of standard deviations above which a difference is significant. It is large because fifteen errors are tested in
@@ -62,11 +62,6 @@ pub fn next(problem: &Problem, found: &Found, bound: f64, held: &[usize]) -> Opt
     });
     let (place, wide, _) = beyond.max_by(|a, b| a.2.total_cmp(&b.2))?;
     Some((place, wide))
-}
-
-/// Whether an error of [`OF_AIR`] was freed: its prior standard deviation is larger in `after` than in `before`.
-pub fn freed_of_air(before: &Values, after: &Values) -> bool {
-    OF_AIR.iter().any(|place| after[*place] > before[*place])
 }
 
 /// Smallest relevant error of the constant `place`, in its unit.

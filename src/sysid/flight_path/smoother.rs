@@ -13,20 +13,24 @@ use crate::flight_path::calibration;
 use crate::flight_path::equations::{Found, Problem, Solved, no_path};
 use crate::flight_path::gusts;
 use crate::flight_path::kinematics::MOTION;
-use crate::flight_path::levels::{CALM, Levels};
-use crate::flight_path::nuisance::WIND;
+use crate::flight_path::levels::{CALM, GUST_TIME, Levels};
+use crate::flight_path::nuisance::{self, SKEW_AIRSPEED, SKEW_VANES, WIND};
 use crate::flight_path::path::Path;
 
 /// Standard deviations of the gusts that are tried first, m/s. `FINE` holds the factors of the refinement around the best
 /// of them.
 const COARSE: [f64; 4] = [0.02, 0.1, 0.5, 2.0];
 const FINE: [f64; 3] = [2.0, 1.4, 1.2];
-/// Gusts of more than this standard deviation (m/s) feign errors of the air-data sensors. The level belongs to the correlation time
-/// of [`gust_kept`](crate::flight_path::kinematics::gust_kept): gusts of 0.14 m/s over 1.5 s change as fast. With a right gain of a
+/// Gusts of more than this standard deviation (m/s) feign errors of the air-data sensors. The level belongs to the correlation
+/// time [`GUST_TIME`]: gusts of 0.14 m/s over 1.5 s change as fast. With a right gain of a
 /// vane that errs, and with a right delay in place of a lag, the level stays below 0.2 m/s.
 const FEIGNING: f64 = 0.5;
 /// Residuals beyond this number of standard deviations are down-weighted.
 const BOUND: f64 = 4.0;
+/// Delays of the air-data sensors.
+const LATE: [usize; 2] = [SKEW_AIRSPEED, SKEW_VANES];
+/// Correlation times of gusts that are tried, s.
+const TIMES: [f64; 6] = [GUST_TIME, 10.0, 5.0, 2.5, 1.2, 0.6];
 /// Number of iterations with gusts.
 const GUSTY: usize = 4;
 /// Number of iterations before noise levels are estimated from residuals. `LAST` is the largest total number of iterations.
@@ -60,24 +64,57 @@ pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
     free(problem, &mut found, &[])?;
     let mut rough = rough(problem, &found, &singular)?;
     let blown = rough.as_ref().is_some_and(|trial| trial.levels.gusts > FEIGNING);
-    if blown && calibration::freed_of_air(&before.widths, &found.widths) {
+    if blown {
         (*problem, found) = (as_usual, before);
+        // gusts tell nothing of the delays of the air-data sensors either
+        LATE.iter().for_each(|place| problem.widths[*place] *= nuisance::HELD);
+        calm(problem, &mut found, FIRST)?;
         free(problem, &mut found, &calibration::OF_AIR)?;
-        rough = self::rough(problem, &found, &singular)?;
+        rough = match self::rough(problem, &found, &singular)? {
+            Some(trial) => Some(correlated(problem, trial).ok_or_else(singular)?),
+            None => None,
+        };
     }
     if let Some(trial) = rough {
         gusty(problem, &mut found, trial, &singular)?;
     }
+    if blown {
+        for place in LATE {
+            found.widths[place] = as_usual.widths[place];
+            found.deviations[place] = as_usual.widths[place];
+        }
+    }
     Ok(found)
+}
+
+/// `trial`, which has strong gusts, with their most likely correlation time and level, beside white noise of the sensors.
+///
+/// The gust's change from one sample to the next is well known, its correlation time is not. That of a usual gust overstates the
+/// error of mean wind and biases where gusts are quick.
+fn correlated(problem: &Problem, mut trial: Found) -> Option<Found> {
+    let step = problem.log.step;
+    trial.levels = trial.levels.beside_gusts(problem.log);
+    trial.levels.gusts = likeliest_gusts(problem, &trial)?;
+    let (change, mut least) = (trial.levels.gust_step(step), f64::INFINITY);
+    let mut best = trial.levels;
+    for gust_time in TIMES {
+        let mut levels = best;
+        (levels.gust_time, levels.gusts) = (gust_time, 1.0);
+        levels.gusts = change / levels.gust_step(step);
+        trial.levels = levels;
+        let now = problem.misfit(&trial, f64::INFINITY)?;
+        if now > least {
+            break;
+        }
+        (best, least) = (levels, now);
+    }
+    trial.levels = best;
+    Some(trial)
 }
 
 /// Gives rare errors of the sensors a wide prior where the data ask for it, and fits again after each one. The constants `held`
 /// keep their priors.
-fn free(
-    problem: &mut Problem,
-    found: &mut Found,
-    held: &[usize],
-) -> Result<(), ReconstructError> {
+fn free(problem: &mut Problem, found: &mut Found, held: &[usize]) -> Result<(), ReconstructError> {
     while let Some((place, width)) = calibration::next(problem, found, BOUND, held) {
         problem.widths[place] = width;
         found.widths = problem.widths;

@@ -43,7 +43,11 @@ pub(super) fn sites(
         let old = before.iter().find(|t| t.id == trial.id).map_or(0, |t| t.points.len());
         for point in trial.points.iter().skip(old) {
             if let Some(own) = point.contribution {
-                sites.push(Site { entry: *entry, values: point.values.clone(), first: count + own });
+                sites.push(Site {
+                    entry: *entry,
+                    values: point.values.clone(),
+                    first: count + own,
+                });
             }
         }
     }
