@@ -252,3 +252,6 @@ fn start(found: &mut Found, problem: &Problem) {
         found.paths.iter_mut().for_each(|path| path.carry(wind));
     }
 }
+
+#[cfg(test)]
+mod tests;
