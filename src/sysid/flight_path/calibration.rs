@@ -64,6 +64,17 @@ pub fn next(problem: &Problem, found: &Found, bound: f64, held: &[usize]) -> Opt
     Some((place, wide))
 }
 
+/// Indices of the errors that were freed in `found` and are not significant with the standard deviations of `found`. `problem` has
+/// the priors before any error was freed.
+pub fn doubtful(problem: &Problem, found: &Found) -> Vec<usize> {
+    let doubtful = |place: &usize| {
+        let off = (found.values[*place] - problem.means[*place]).abs();
+        found.widths[*place] > problem.widths[*place]
+            && off < BEYOND_DOUBT * found.deviations[*place]
+    };
+    (0..COUNT).filter(doubtful).collect()
+}
+
 /// Smallest relevant error of the constant `place`, in its unit.
 fn least(problem: &Problem, place: usize) -> f64 {
     match place {

@@ -154,10 +154,10 @@ impl Levels {
                 log.tracks.iter().map(|t| (0..t.len()).map(|k| of(t, k)).collect::<Vec<f64>>()),
             )
         };
-        for channel in 3..6 {
-            let white = readings(&|t, k| measurement::measured(t, channel, k)).max(FLOORS[channel]);
+        for (channel, floor) in FLOORS.iter().enumerate().take(6).skip(3) {
+            let white = readings(&|t, k| measurement::measured(t, channel, k));
             if !self.stated[channel] && white.is_finite() {
-                self.measured[channel] = self.measured[channel].min(white);
+                self.measured[channel] = self.measured[channel].min(white.max(*floor));
             }
         }
         self

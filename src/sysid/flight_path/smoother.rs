@@ -59,32 +59,54 @@ pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
     };
     start(&mut found, problem);
     calm(problem, &mut found, 0)?;
-    let (as_usual, before) = (*problem, found.clone());
-    let problem = &mut problem.clone();
-    free(problem, &mut found, &[])?;
-    let mut rough = rough(problem, &found, &singular)?;
-    let blown = rough.as_ref().is_some_and(|trial| trial.levels.gusts > FEIGNING);
-    if blown {
-        (*problem, found) = (as_usual, before);
-        // gusts tell nothing of the delays of the air-data sensors either
-        LATE.iter().for_each(|place| problem.widths[*place] *= nuisance::HELD);
-        calm(problem, &mut found, FIRST)?;
-        free(problem, &mut found, &calibration::OF_AIR)?;
-        rough = match self::rough(problem, &found, &singular)? {
-            Some(trial) => Some(correlated(problem, trial).ok_or_else(singular)?),
-            None => None,
-        };
-    }
-    if let Some(trial) = rough {
-        gusty(problem, &mut found, trial, &singular)?;
-    }
-    if blown {
-        for place in LATE {
-            found.widths[place] = as_usual.widths[place];
-            found.deviations[place] = as_usual.widths[place];
-        }
+    let before = found.clone();
+    let mut freed = problem.clone();
+    free(&mut freed, &mut found, &[])?;
+    let rough = rough(&freed, &found, &singular)?;
+    match rough {
+        Some(trial) if trial.levels.gusts > FEIGNING => return in_gusts(problem, &before),
+        Some(trial) => gusty(&freed, &mut found, trial, &singular)?,
+        None => (),
     }
     Ok(found)
+}
+
+/// Fits again from `before`, a fit without rare errors of the sensors, if gusts are strong. Errors that gusts can feign keep their
+/// priors. Any other error must be beyond doubt with the standard deviation that gusts give it, too.
+fn in_gusts(problem: &Problem, before: &Found) -> Result<Found, ReconstructError> {
+    let singular = || no_path(&problem.options.name, "the equations became singular");
+    let mut held = calibration::OF_AIR.to_vec();
+    loop {
+        let (mut freed, mut found) = (problem.clone(), before.clone());
+        // gusts tell nothing of the delays of the air-data sensors either
+        LATE.iter().for_each(|place| freed.widths[*place] *= nuisance::HELD);
+        calm(&freed, &mut found, FIRST)?;
+        free(&mut freed, &mut found, &held)?;
+        if let Some(trial) = rough(&freed, &found, &singular)? {
+            let trial = correlated(&freed, trial).ok_or_else(singular)?;
+            gusty(&freed, &mut found, trial, &singular)?;
+        }
+        for place in LATE {
+            found.widths[place] = problem.widths[place];
+            found.deviations[place] = problem.widths[place];
+        }
+        let doubtful = calibration::doubtful(problem, &found);
+        if doubtful.is_empty() {
+            return Ok(found);
+        }
+        held.extend(doubtful);
+    }
+}
+
+/// Gives rare errors of the sensors a wide prior where the data ask for it, and fits again after each one. The constants `held`
+/// keep their priors.
+fn free(problem: &mut Problem, found: &mut Found, held: &[usize]) -> Result<(), ReconstructError> {
+    while let Some((place, width)) = calibration::next(problem, found, BOUND, held) {
+        problem.widths[place] = width;
+        found.widths = problem.widths;
+        calm(problem, found, FIRST)?;
+    }
+    Ok(())
 }
 
 /// `trial`, which has strong gusts, with their most likely correlation time and level, beside white noise of the sensors.
@@ -110,17 +132,6 @@ fn correlated(problem: &Problem, mut trial: Found) -> Option<Found> {
     }
     trial.levels = best;
     Some(trial)
-}
-
-/// Gives rare errors of the sensors a wide prior where the data ask for it, and fits again after each one. The constants `held`
-/// keep their priors.
-fn free(problem: &mut Problem, found: &mut Found, held: &[usize]) -> Result<(), ReconstructError> {
-    while let Some((place, width)) = calibration::next(problem, found, BOUND, held) {
-        problem.widths[place] = width;
-        found.widths = problem.widths;
-        calm(problem, found, FIRST)?;
-    }
-    Ok(())
 }
 
 /// Fits motion and constants without gusts. The iterations are numbered from `from`.

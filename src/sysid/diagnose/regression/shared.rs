@@ -149,3 +149,24 @@ fn differences(before: &Placed, after: &Placed) -> Placed {
     };
     after.iter().filter_map(of).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn in_gusts_the_path_forgets_within_a_sample_or_two() {
+        let of = |gust_step: f64| {
+            let noise = [0.0, 0.0, 0.3, 0.005, 0.005, 0.005, 0.005, 0.005];
+            let empty = Reconstruction::empty("f");
+            let flight = Reconstruction { noise, force_noise: [0.1; 3], gust_step, ..empty };
+            path_error(&flight, 0.01)[0]
+        };
+        // the integrated accelerometer wanders by 1 mm/s in a sample, beside 0.3 m/s of noise
+        let [sd, kept] = of(0.0);
+        assert!(sd == 0.3 && (kept - (-0.001_f64 / 0.3).exp()).abs() < 1e-8, "{sd} {kept}");
+        // a gust that changes by as much as the noise: z + 1/z = 3
+        let [_, kept] = of(0.3);
+        assert!((kept + kept.recip() - 3.0).abs() < 1e-4, "{kept}");
+    }
+}

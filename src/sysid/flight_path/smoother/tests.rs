@@ -47,7 +47,7 @@ fn through_gusts() -> Flight {
             throttle: 0.5,
             ..Sample::default()
         };
-        let rudder = if (time_s / 2.5) as u32 % 2 == 0 { 1.0 } else { -1.0 };
+        let rudder = if ((time_s / 2.5) as u32).is_multiple_of(2) { 1.0 } else { -1.0 };
         (u, v) = (u + STEP * (ax + r * v), v + STEP * (ay - r * u));
         (yaw, r) = (yaw + STEP * r, r + STEP * (30.0 * beta - 4.0 * r + rudder));
         sample
