@@ -267,6 +267,7 @@ fn imagine(
         noise,
         left: noise,
         force_noise,
+        gust_step: 0.0,
         rudder: None,
         notes: Vec::new(),
     };

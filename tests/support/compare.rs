@@ -172,6 +172,7 @@ pub fn as_measured(name: &str, flight: &Flight, noise: Noise) -> Reconstruction 
         noise: noise.state,
         left: noise.state,
         force_noise: [noise.force; 3],
+        gust_step: 0.0,
         rudder: None,
         notes: Vec::new(),
     }

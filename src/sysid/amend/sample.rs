@@ -42,6 +42,7 @@ pub fn flight(model: &GreyBox, name: &str, count: u32, phase: f64) -> Reconstruc
         noise: [1e-3; 8],
         left: [1e-3; 8],
         force_noise: [0.1; 3],
+        gust_step: 0.0,
         ..Reconstruction::empty(name)
     }
 }

@@ -261,6 +261,7 @@ mod tests {
             noise: [f64::NAN; 8],
             left: [f64::NAN; 8],
             force_noise: [f64::NAN; 3],
+            gust_step: 0.0,
             rudder: None,
             notes: Vec::new(),
         };

@@ -168,9 +168,10 @@ impl Problem<'_> {
     /// the gusts are left out. `None` if the equations have no solution.
     pub fn misfit(&self, found: &Found, bound: f64) -> Option<f64> {
         let left = self.constants::<MOTION_AND_GUST, 1, 1, 1>(found, bound, None)?;
-        let components = 3.0 * found.paths.iter().map(Path::len).sum::<usize>() as f64;
-        let misfit = left.corner[0][0] + left.log_det;
-        Some(misfit + 2.0 * components * found.levels.gusts.ln())
+        let (first, new) = (found.levels.gusts.ln(), found.levels.gust_step(self.log.step).ln());
+        let scale = |path: &Path| 2.0 * 3.0 * (first + path.len().saturating_sub(1) as f64 * new);
+        let scales = found.paths.iter().map(scale).sum::<f64>();
+        Some(left.corner[0][0] + left.log_det + scales)
     }
 
     /// Information matrix of the constants, from prior and data. For a constant that no column of the log can show, it has only

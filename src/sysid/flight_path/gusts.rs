@@ -9,7 +9,6 @@ use nalgebra::{Matrix3, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::flight_path::equations::{Found, Problem};
-use crate::flight_path::kinematics::gust_kept;
 use crate::flight_path::measurement::{OTHERS, Others, by_gust};
 use crate::flight_path::nuisance::{COUNT, Values};
 use crate::flight_path::path::Path;
@@ -58,8 +57,9 @@ fn draws(
     random: &mut Stream,
 ) -> Vec<[Others; 3]> {
     let mut draw = || -> f64 { StandardNormal.sample(random) };
-    let (level, kept) = (rough.levels.gusts, gust_kept(problem.log.step));
-    let fresh = level * (1.0 - kept * kept).sqrt();
+    let step = problem.log.step;
+    let (level, kept) = (rough.levels.gusts, rough.levels.gust_kept(step));
+    let fresh = rough.levels.gust_step(step);
     let mut gusts: [Vector3<f64>; PAIRS] =
         std::array::from_fn(|_| Vector3::from_fn(|_, _| level * draw()));
     let (l, white) = (&found.levels, &rough.levels.measured);

@@ -5,21 +5,13 @@ use nalgebra::{Matrix3, Vector3};
 use crate::flight_path::band::{Block, Wide};
 use crate::flight_path::channel::cubic;
 use crate::flight_path::intake::{Span, Track};
+use crate::flight_path::levels::GUST_TIME;
 use crate::flight_path::nuisance::{
     self, EARTH, FORCE, FORCE_GAIN, GYRO_GAIN, INERTIAL, SKEW_FORCE, Values,
 };
 use crate::flight_path::path::Path;
 use crate::flight_path::rotation::{self, cross, exp, log};
 use greylag_logs::Sampling;
-
-/// Correlation time of gusts, s: length scale of turbulence at an altitude of some hundred metres divided by the airspeed
-/// of a small aircraft.
-const GUST_TIME: f64 = 20.0;
-
-/// Autocorrelation of a gust after the time `step` (s).
-pub fn gust_kept(step: f64) -> f64 {
-    (-step / GUST_TIME).exp()
-}
 
 /// Mean body rates and specific forces over each interval between samples, from gyros and accelerometers.
 #[derive(Clone, Debug)]
@@ -30,6 +22,8 @@ pub struct Drive {
     force: Vec<Vector3<f64>>,
     /// Derivative of `force` with respect to the accelerometers' delay, body axes, m/s³.
     force_by_skew: Vec<Vector3<f64>>,
+    /// Correlation time of the gusts, s.
+    gust_time: f64,
     /// Time of the first sample, s.
     start: f64,
     /// Extent in time of the flight.
@@ -90,7 +84,8 @@ impl Drive {
         let has_force = track.force.first().is_some_and(|f| f[0].is_finite());
         let (start, span) = (track.start, track.span);
         let [rate, force, force_by_skew] = std::array::from_fn(|_| Vec::with_capacity(n - 1));
-        let mut drive = Drive { rate, force, force_by_skew, start, span };
+        let gust_time = GUST_TIME;
+        let mut drive = Drive { rate, force, force_by_skew, gust_time, start, span };
         let (mut before, mut now) = (gyro(0), gyro(0));
         for k in 0..n - 1 {
             let after = gyro(k + 1);
@@ -119,9 +114,14 @@ impl Drive {
         drive
     }
 
+    /// The same with gusts of the correlation time `gust_time` (s).
+    pub fn in_gusts(self, gust_time: f64) -> Drive {
+        Drive { gust_time, ..self }
+    }
+
     /// The step from sample `k` to the next sample, linearised at `path`.
     ///
-    /// The gust decays with the time constant [`GUST_TIME`].
+    /// The gust decays with its correlation time.
     pub fn step<const N: usize, const D: usize>(
         &self,
         path: &Path,
@@ -152,7 +152,7 @@ impl Drive {
             link.rest[3 + i][D - 1] = -velocity[i];
         }
         if N == MOTION_AND_GUST {
-            let kept = gust_kept(step);
+            let kept = (-step / self.gust_time).exp();
             let gust = path.gust[k + 1] - path.gust[k] * kept;
             put(&mut link.first, (6, 6), &(one * -kept));
             put(&mut link.second, (6, 6), &one);

@@ -33,6 +33,9 @@ const WIDEST: [f64; CHANNELS] = [0.05, 0.05, 0.1, 2.0, 0.1, 0.1, 1.0, 1.0, 1.0];
 const EXCESSIVE: f64 = 2.0;
 /// Standard deviation of the specific force if the log has no accelerometers, m/s².
 const UNKNOWN_FORCE: f64 = 3.0;
+/// Usual correlation time of gusts, s: length scale of turbulence at an altitude of some hundred metres divided by the airspeed
+/// of a small aircraft.
+pub const GUST_TIME: f64 = 20.0;
 /// Standard deviation of the gusts in calm air, m/s.
 pub const CALM: f64 = 0.002;
 /// Index of the airspeed among the measured channels.
@@ -55,6 +58,8 @@ pub struct Levels {
     pub force: [f64; 3],
     /// Gusts, standard deviation of each component, m/s.
     pub gusts: f64,
+    /// Correlation time of the gusts, s.
+    pub gust_time: f64,
     /// Noise of the measured channels, in their units.
     pub measured: [f64; CHANNELS],
     /// Smallest levels of the channels: the white part of the measurements, if more than half of the samples have a
@@ -119,6 +124,7 @@ impl Levels {
             gyro,
             force,
             gusts: CALM,
+            gust_time: GUST_TIME,
             measured: std::array::from_fn(|i| or(white[i], DEFAULTS[i]).max(floor[i])),
             white: std::array::from_fn(
                 |i| if dense(i) { white[i].max(floor[i]) } else { floor[i] },
@@ -128,6 +134,33 @@ impl Levels {
             slow_airspeed: slow_airspeed(log, sum / count),
         }
         .as_stated(log)
+    }
+
+    /// Autocorrelation of a gust after the time `step` (s).
+    pub fn gust_kept(&self, step: f64) -> f64 {
+        (-step / self.gust_time).exp()
+    }
+
+    /// Standard deviation of the part of a gust that is new after the time `step` (s), m/s.
+    pub fn gust_step(&self, step: f64) -> f64 {
+        self.gusts * (1.0 - self.gust_kept(step).powi(2)).sqrt()
+    }
+
+    /// These levels with air-data sensors that have white noise alone, beside gusts that are estimated: see
+    /// [`noise::white_beside_walk`]. Stated levels stay.
+    pub fn beside_gusts(mut self, log: &Log) -> Levels {
+        let readings = |of: &dyn Fn(&Track, usize) -> f64| {
+            noise::white_beside_walk(
+                log.tracks.iter().map(|t| (0..t.len()).map(|k| of(t, k)).collect::<Vec<f64>>()),
+            )
+        };
+        for (channel, floor) in FLOORS.iter().enumerate().take(6).skip(3) {
+            let white = readings(&|t, k| measurement::measured(t, channel, k));
+            if !self.stated[channel] && white.is_finite() {
+                self.measured[channel] = self.measured[channel].min(white.max(*floor));
+            }
+        }
+        self
     }
 
     /// These levels, with the stated noise of the log's sensors instead of the estimates.

@@ -23,6 +23,24 @@ pub fn white(samples: impl Iterator<Item = f64>) -> f64 {
     if median > 0.0 { median } else { mean_square.sqrt() / gain }
 }
 
+/// Standard deviation of the white part of signals that also hold a random walk, as vanes in gusts, in their unit. NaN if the
+/// signals show none. `tracks` holds the samples of each track; missing samples are skipped.
+///
+/// Second differences of a random walk have no correlation over two samples, and those of a smooth signal vanish. White noise of
+/// variance R gives them the autocovariance R at this lag. Fourth differences count the steps of the walk as noise.
+pub fn white_beside_walk(tracks: impl Iterator<Item = Vec<f64>>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for track in tracks {
+        let x: Vec<f64> = track.into_iter().filter(|x| x.is_finite()).collect();
+        let bends: Vec<f64> = x.windows(3).map(|w| w[0] - 2.0 * w[1] + w[2]).collect();
+        for pair in bends.windows(3) {
+            sum += pair[0] * pair[2];
+            count += 1.0;
+        }
+    }
+    if count < FEWEST as f64 { f64::NAN } else { (sum / count).sqrt() }
+}
+
 /// Root mean square of `residuals`, with outliers limited to four standard deviations estimated from the median. NaN for too
 /// few residuals. Reorders the slice.
 pub fn level(residuals: &mut [f64]) -> f64 {
@@ -76,6 +94,22 @@ mod tests {
         assert!((white(x) / 0.02 - 1.0).abs() < 0.06);
         let mut noise = noise;
         assert!((level(&mut noise) - 1.0).abs() < 0.04);
+    }
+
+    #[test]
+    fn white_noise_beside_a_random_walk_is_told_from_its_steps() {
+        let all = noise(16_000);
+        let (noise, steps) = all.split_at(8000);
+        let mut walk = 0.0;
+        let x: Vec<f64> = (0..8000)
+            .map(|k| {
+                walk += 0.02 * steps[k];
+                walk + 0.02 * noise[k] + (k as f64 * 0.05).sin()
+            })
+            .collect();
+        assert!(white(x.iter().copied()) > 1.1 * 0.02);
+        // the autocovariance, 8 times that of the noise at lag 0, has a standard deviation of 9 %, its root half of that
+        assert!((white_beside_walk([x].into_iter()) / 0.02 - 1.0).abs() < 0.12);
     }
 
     #[test]

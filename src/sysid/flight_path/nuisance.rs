@@ -106,7 +106,7 @@ impl Span {
 
 /// Prior standard deviation of a constant that is held or known exactly, as a fraction of its usual prior standard deviation. A
 /// value above zero keeps the equations regular.
-const HELD: f64 = 1e-4;
+pub const HELD: f64 = 1e-4;
 
 /// Rare instrument errors with their prior standard deviations. They are held at zero until a flight shows them
 /// significantly (see `calibration`).

@@ -8,6 +8,7 @@ use crate::flight_path::channel::wrap;
 use crate::flight_path::equations::{Found, Problem, no_path};
 use crate::flight_path::intake::{Log, Track};
 use crate::flight_path::kinematics::shifted;
+use crate::flight_path::levels::CALM;
 use crate::flight_path::nuisance::{
     self, BEND, COUNT, DRIFT, FORCE, FORCE_GAIN, GYRO_GAIN, SKEW_FORCE, Values, WIND,
 };
@@ -95,6 +96,7 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
         noise: [m[0], m[1], m[3], l.gyro[0], l.gyro[1], l.gyro[2], m[4], m[5]],
         left,
         force_noise: if log.has.force { l.force } else { [m[6].max(m[7]) / log.step; 3] },
+        gust_step: if l.gusts > CALM { l.gust_step(log.step) } else { 0.0 },
         rudder: log.rudder,
         notes,
     };

@@ -86,6 +86,8 @@ pub struct Reconstruction {
     pub left: [f64; 8],
     /// Standard deviations of the specific force's noise in body axes x, y, z, m/s².
     pub force_noise: [f64; 3],
+    /// Standard deviation of the change of a gust component from one sample to the next, m/s; 0 if the path has no gusts.
+    pub gust_step: f64,
     /// Motion of the rudder, if it moves.
     pub rudder: Option<RudderMotion>,
     /// Notes on assumptions and on lost accuracy, for example without a vane.
@@ -106,6 +108,7 @@ impl Reconstruction {
             noise: [0.0; 8],
             left: [0.0; 8],
             force_noise: [0.0; 3],
+            gust_step: 0.0,
             rudder: None,
             notes: Vec::new(),
         }

@@ -13,16 +13,24 @@ use crate::flight_path::calibration;
 use crate::flight_path::equations::{Found, Problem, Solved, no_path};
 use crate::flight_path::gusts;
 use crate::flight_path::kinematics::MOTION;
-use crate::flight_path::levels::{CALM, Levels};
-use crate::flight_path::nuisance::WIND;
+use crate::flight_path::levels::{CALM, GUST_TIME, Levels};
+use crate::flight_path::nuisance::{self, SKEW_AIRSPEED, SKEW_VANES, WIND};
 use crate::flight_path::path::Path;
 
 /// Standard deviations of the gusts that are tried first, m/s. `FINE` holds the factors of the refinement around the best
 /// of them.
 const COARSE: [f64; 4] = [0.02, 0.1, 0.5, 2.0];
 const FINE: [f64; 3] = [2.0, 1.4, 1.2];
+/// Gusts of more than this standard deviation (m/s) feign errors of the air-data sensors. The level belongs to the correlation
+/// time [`GUST_TIME`]: gusts of 0.14 m/s over 1.5 s change as fast. With a right gain of a
+/// vane that errs, and with a right delay in place of a lag, the level stays below 0.2 m/s.
+const FEIGNING: f64 = 0.5;
 /// Residuals beyond this number of standard deviations are down-weighted.
 const BOUND: f64 = 4.0;
+/// Delays of the air-data sensors.
+const LATE: [usize; 2] = [SKEW_AIRSPEED, SKEW_VANES];
+/// Correlation times of gusts that are tried, s.
+const TIMES: [f64; 6] = [GUST_TIME, 10.0, 5.0, 2.5, 1.2, 0.6];
 /// Number of iterations with gusts.
 const GUSTY: usize = 4;
 /// Number of iterations before noise levels are estimated from residuals. `LAST` is the largest total number of iterations.
@@ -51,14 +59,79 @@ pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
     };
     start(&mut found, problem);
     calm(problem, &mut found, 0)?;
-    let problem = &mut problem.clone();
-    while let Some((place, width)) = calibration::next(problem, &found, BOUND) {
+    let before = found.clone();
+    let mut freed = problem.clone();
+    free(&mut freed, &mut found, &[])?;
+    let rough = rough(&freed, &found, &singular)?;
+    match rough {
+        Some(trial) if trial.levels.gusts > FEIGNING => return in_gusts(problem, &before),
+        Some(trial) => gusty(&freed, &mut found, trial, &singular)?,
+        None => (),
+    }
+    Ok(found)
+}
+
+/// Fits again from `before`, a fit without rare errors of the sensors, if gusts are strong. Errors that gusts can feign keep their
+/// priors. Any other error must be beyond doubt with the standard deviation that gusts give it, too.
+fn in_gusts(problem: &Problem, before: &Found) -> Result<Found, ReconstructError> {
+    let singular = || no_path(&problem.options.name, "the equations became singular");
+    let mut held = calibration::OF_AIR.to_vec();
+    loop {
+        let (mut freed, mut found) = (problem.clone(), before.clone());
+        // gusts tell nothing of the delays of the air-data sensors either
+        LATE.iter().for_each(|place| freed.widths[*place] *= nuisance::HELD);
+        calm(&freed, &mut found, FIRST)?;
+        free(&mut freed, &mut found, &held)?;
+        if let Some(trial) = rough(&freed, &found, &singular)? {
+            let trial = correlated(&freed, trial).ok_or_else(singular)?;
+            gusty(&freed, &mut found, trial, &singular)?;
+        }
+        for place in LATE {
+            found.widths[place] = problem.widths[place];
+            found.deviations[place] = problem.widths[place];
+        }
+        let doubtful = calibration::doubtful(problem, &found);
+        if doubtful.is_empty() {
+            return Ok(found);
+        }
+        held.extend(doubtful);
+    }
+}
+
+/// Gives rare errors of the sensors a wide prior where the data ask for it, and fits again after each one. The constants `held`
+/// keep their priors.
+fn free(problem: &mut Problem, found: &mut Found, held: &[usize]) -> Result<(), ReconstructError> {
+    while let Some((place, width)) = calibration::next(problem, found, BOUND, held) {
         problem.widths[place] = width;
         found.widths = problem.widths;
-        calm(problem, &mut found, FIRST)?;
+        calm(problem, found, FIRST)?;
     }
-    gusty(problem, &mut found, &singular)?;
-    Ok(found)
+    Ok(())
+}
+
+/// `trial`, which has strong gusts, with their most likely correlation time and level, beside white noise of the sensors.
+///
+/// The gust's change from one sample to the next is well known, its correlation time is not. That of a usual gust overstates the
+/// error of mean wind and biases where gusts are quick.
+fn correlated(problem: &Problem, mut trial: Found) -> Option<Found> {
+    let step = problem.log.step;
+    trial.levels = trial.levels.beside_gusts(problem.log);
+    trial.levels.gusts = likeliest_gusts(problem, &trial)?;
+    let (change, mut least) = (trial.levels.gust_step(step), f64::INFINITY);
+    let mut best = trial.levels;
+    for gust_time in TIMES {
+        let mut levels = best;
+        (levels.gust_time, levels.gusts) = (gust_time, 1.0);
+        levels.gusts = change / levels.gust_step(step);
+        trial.levels = levels;
+        let now = problem.misfit(&trial, f64::INFINITY)?;
+        if now > least {
+            break;
+        }
+        (best, least) = (levels, now);
+    }
+    trial.levels = best;
+    Some(trial)
 }
 
 /// Fits motion and constants without gusts. The iterations are numbered from `from`.
@@ -108,15 +181,16 @@ fn search(
     Ok(0.0)
 }
 
-/// Estimates gusts along the path if the data make gusts more likely than white noise of the air-data sensors.
-fn gusty(
+/// `found` with the most likely level of the gusts. `None` if the data do not make gusts more likely than white noise of the
+/// air-data sensors.
+fn rough(
     problem: &Problem,
-    found: &mut Found,
+    found: &Found,
     singular: &dyn Fn() -> ReconstructError,
-) -> Result<(), ReconstructError> {
+) -> Result<Option<Found>, ReconstructError> {
     // if a vane is missing, a filter or a delay of the airspeed sensor would be mistaken for vertical gusts
     if !(problem.log.has.alpha && problem.log.has.beta) {
-        return Ok(());
+        return Ok(None);
     }
     let mut trial = found.clone();
     for channel in 3..6 {
@@ -124,9 +198,16 @@ fn gusty(
         trial.levels.colour[channel] = 1.0;
     }
     trial.levels.gusts = likeliest_gusts(problem, &trial).ok_or_else(singular)?;
-    if trial.levels.gusts <= CALM {
-        return Ok(());
-    }
+    Ok(Some(trial).filter(|trial| trial.levels.gusts > CALM))
+}
+
+/// Estimates gusts along the path with the levels of `trial`, which is `found` with gusts.
+fn gusty(
+    problem: &Problem,
+    found: &mut Found,
+    mut trial: Found,
+    singular: &dyn Fn() -> ReconstructError,
+) -> Result<(), ReconstructError> {
     let deviations = gusts::deviations(problem, found, &trial, BOUND).ok_or_else(singular)?;
     for _ in 0..GUSTY {
         let solved = problem.held(&trial, BOUND).ok_or_else(singular)?;
@@ -182,3 +263,6 @@ fn start(found: &mut Found, problem: &Problem) {
         found.paths.iter_mut().for_each(|path| path.carry(wind));
     }
 }
+
+#[cfg(test)]
+mod tests;

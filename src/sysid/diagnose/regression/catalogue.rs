@@ -283,7 +283,7 @@ impl Columns {
 
 /// Columns of a nonlinear candidate whose coefficients are `values`, for each flight: the candidate's contribution, then its
 /// derivatives with respect to the free coefficients. `None` if the candidate cannot be added to the model with these values.
-fn curved_columns(
+pub fn curved_columns(
     model: &GreyBox,
     flights: &[Ready],
     entry: &Entry,

@@ -23,22 +23,30 @@ pub type PathError = [[f64; 2]; 3];
 
 /// Computes the path errors of a flight with the sampling interval `dt` (s), for a steady-state smoother.
 ///
-/// The smoother combines the measured value with the integrated rates. Let R be the variance of the measurement and q
-/// the variance of an integration step. The smoother's memory is then √(R/q) samples to either side.
+/// The smoother combines the measured value with a prediction from the sample before: rates are integrated, and a gust keeps its
+/// value. Let R be the variance of the measurement and Q that of the prediction's step. The weight decreases by the factor z from
+/// one sample to the next, with z + 1/z = 2 + Q/R (the smoother of a random walk). In gusts the memory is a few samples, so that
+/// far more of the vanes' noise is left.
 pub fn path_error(flight: &Reconstruction, dt: f64) -> PathError {
     let [fx, fy, fz] = flight.force_noise.map(|x| if x.is_finite() { x } else { 0.0 });
     let [_, _, v, p, q, r, alpha, beta] = flight.noise.map(|x| if x.is_finite() { x } else { 0.0 });
     let speeds = flight.segments.iter().flat_map(|s| s.instants.iter().map(|i| i.state.airspeed));
     let (sum, count) = speeds.fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
     let speed: f64 = if count > 0.0 { sum / count } else { 1.0 };
-    let of = |measured: f64, rate: f64| {
-        if measured <= 0.0 || rate <= 0.0 {
+    let gust = flight.gust_step * (dt / flight.step_s).sqrt();
+    let of = |measured: f64, step: f64| {
+        if measured <= 0.0 || step <= 0.0 {
             [0.0, 0.0]
         } else {
-            [measured, (-rate * dt / measured).exp()]
+            let ratio = step / measured;
+            [measured, 1.0 + 0.5 * ratio * ratio - ratio * (1.0 + 0.25 * ratio * ratio).sqrt()]
         }
     };
-    [of(v, fx), of(alpha, (fz / speed).hypot(q)), of(beta, (fy / speed).hypot(r).hypot(0.1 * p))]
+    [
+        of(v, (fx * dt).hypot(gust)),
+        of(alpha, ((fz / speed).hypot(q) * dt).hypot(gust / speed)),
+        of(beta, ((fy / speed).hypot(r).hypot(0.1 * p) * dt).hypot(gust / speed)),
+    ]
 }
 
 /// Returns `flight` with additional simulated noise of inertial sensors, vanes and airspeed. The noise of the path is filtered
@@ -140,4 +148,25 @@ fn differences(before: &Placed, after: &Placed) -> Placed {
         Some((*place, std::array::from_fn(channel)))
     };
     after.iter().filter_map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn in_gusts_the_path_forgets_within_a_sample_or_two() {
+        let of = |gust_step: f64| {
+            let noise = [0.0, 0.0, 0.3, 0.005, 0.005, 0.005, 0.005, 0.005];
+            let empty = Reconstruction::empty("f");
+            let flight = Reconstruction { noise, force_noise: [0.1; 3], gust_step, ..empty };
+            path_error(&flight, 0.01)[0]
+        };
+        // the integrated accelerometer wanders by 1 mm/s in a sample, beside 0.3 m/s of noise
+        let [sd, kept] = of(0.0);
+        assert!(sd == 0.3 && (kept - (-0.001_f64 / 0.3).exp()).abs() < 1e-8, "{sd} {kept}");
+        // a gust that changes by as much as the noise: z + 1/z = 3
+        let [_, kept] = of(0.3);
+        assert!((kept + kept.recip() - 3.0).abs() < 1e-4, "{kept}");
+    }
 }

@@ -98,6 +98,7 @@ mod tests {
             noise: [0.0; 8],
             left: [0.0; 8],
             force_noise: [f64::NAN; 3],
+            gust_step: 0.0,
             rudder: None,
             notes: Vec::new(),
         }

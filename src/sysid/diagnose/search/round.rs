@@ -6,6 +6,7 @@
 //! projected out of the residual (measured minus predicted value) and of the candidates' columns. Nonlinear candidates are
 //! linearised at several points, which are sets of values of their coefficients.
 
+mod curved_noise;
 mod known;
 mod shared_noise;
 mod tuned;
@@ -135,13 +136,10 @@ impl Round {
             Noise::estimate(&cells, &rich(&placed, known.len(), &made.trials), last)
         });
         let kept: Vec<Placed> = placed.iter().map(|l| up_to(l, last)).collect();
-        let (shared, disturbed) = shared(
-            &Setting { problem, model: &model, entries, accelerating },
-            &cells,
-            &kept,
-            last,
-            &noise,
-        );
+        let setting = Setting { problem, model: &model, entries, accelerating };
+        let (mut shared, disturbed) = shared(&setting, &cells, &kept, last, &noise);
+        let sites = curved_noise::sites(&made.trials, &[], entries, known.len());
+        curved_noise::add(&setting, &cells, &kept, last, &noise, &sites, &mut shared);
         let shares = sum(&shared);
         let mut projected = Projected::new(&cells, &kept, last, &known, &noise, &shares)?;
         for _ in 0..CURVATURES {
@@ -170,8 +168,8 @@ impl Round {
     }
 
     /// Returns the indices and scores of all candidates, the best first. Nonlinear candidates that rank high are linearised again
-    /// at their best fit.
-    pub fn rank(&mut self) -> Vec<(usize, Score)> {
+    /// at their best fit. `problem` is that of the round.
+    pub fn rank(&mut self, problem: &Problem) -> Vec<(usize, Score)> {
         let mut scores = self.scores();
         for _ in 0..REFINEMENTS {
             let best = scores.first().map_or(0.0, |(_, s)| s.evidence);
@@ -189,7 +187,7 @@ impl Round {
                     wanted.push((trial.id, self.next_place(trial, score)));
                 }
             }
-            if wanted.is_empty() || !self.refine(wanted) {
+            if wanted.is_empty() || !self.refine(problem, wanted) {
                 break;
             }
             scores = self.scores();
@@ -214,18 +212,25 @@ impl Round {
 
     /// Adds the points of linearisation `wanted`, each with the id of its candidate. Returns `false` if the regressors with these
     /// points cannot be used.
-    fn refine(&mut self, wanted: Vec<(&'static str, Vec<f64>)>) -> bool {
+    fn refine(&mut self, problem: &Problem, wanted: Vec<(&'static str, Vec<f64>)>) -> bool {
         self.refined.extend(wanted);
         let made = catalogue::columns(&self.model, &self.flights, &self.entries, &self.refined);
         let count = self.known.len();
         let mut placed: Vec<Placed> =
             self.placed.iter().map(|l| up_to(l, count.saturating_sub(1))).collect();
         let last = place(&mut placed, count, &made, &self.flights);
+        let trials = [&self.trials[..], &made.trials[..]];
+        let mut bias = curved_noise::carried(&self.shared, trials, count, last);
+        let sites = curved_noise::sites(&made.trials, &self.trials, &self.entries, count);
+        let (model, entries) = (&self.model, &self.entries[..]);
+        let setting = Setting { problem, model, entries, accelerating: None };
+        curved_noise::add(&setting, &self.cells, &placed, last, &self.noise, &sites, &mut bias);
         let Some(projected) =
-            Projected::new(&self.cells, &placed, last, &self.known, &self.noise, &self.shared())
+            Projected::new(&self.cells, &placed, last, &self.known, &self.noise, &sum(&bias))
         else {
             return false;
         };
+        self.shared = bias;
         for (list, old) in placed.iter_mut().zip(&self.placed) {
             let features = old.iter().filter(|(p, _)| *p > self.last);
             list.extend(features.map(|(p, c)| (p - self.last + last, c.clone())));

@@ -48,7 +48,7 @@ impl Ranked {
 /// If these accelerations are too inaccurate, the ranking is repeated with the accelerations of a better model.
 pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
     let rank = |mut round: Round| {
-        let scores = round.rank();
+        let scores = round.rank(problem);
         let nulls = nulls::best(&round.projected, &round.trials, options.seed, options.nulls);
         let threshold = nulls::threshold(&nulls, options.level);
         Ranked { round, scores, nulls, threshold }

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use super::{Found, Problem};
 use crate::flight_path::band::{self, Link, Node, add_gram, add_upper_gram};
 use crate::flight_path::intake::Track;
-use crate::flight_path::kinematics::{Drive, MOTION, Step, gust_kept};
+use crate::flight_path::kinematics::{Drive, MOTION, Step};
 use crate::flight_path::levels::Levels;
 use crate::flight_path::measurement::{self, Others, Reading};
 use crate::flight_path::nuisance::Values;
@@ -52,7 +52,7 @@ impl<'a, const N: usize, const M: usize, const D: usize> Along<'a, N, M, D> {
         let vanes_at = problem.log.sensors.vanes_at();
         Along {
             readings: measurement::readings(track, path, values, step, vanes_at),
-            drive: Drive::new(track, values, step, problem.sampling, gravity),
+            drive: Drive::new(track, values, step, problem.sampling, gravity).in_gusts(l.gust_time),
             first: path.gust[0],
             gusts: l.gusts,
             spread: std::array::from_fn(|i| l.measured[i] * l.colour[i]),
@@ -103,7 +103,7 @@ impl<const N: usize, const W: usize, const M: usize, const D: usize> band::Equat
 
 /// Standard deviations of the residuals of a kinematic step over `step` (s): attitude (rad), velocity (m/s), gust (m/s).
 pub fn step_deviations<const N: usize>(levels: &Levels, step: f64) -> [f64; N] {
-    let gust = levels.gusts * (1.0 - gust_kept(step).powi(2)).sqrt();
+    let gust = levels.gust_step(step);
     std::array::from_fn(|i| match i {
         0..3 => levels.gyro[i] * step,
         3..MOTION => levels.force[i - 3] * step,
