@@ -21,9 +21,8 @@ use crate::flight_path::path::Path;
 /// of them.
 const COARSE: [f64; 4] = [0.02, 0.1, 0.5, 2.0];
 const FINE: [f64; 3] = [2.0, 1.4, 1.2];
-/// Gusts of more than this standard deviation (m/s) feign errors of the air-data sensors. The level belongs to the correlation
-/// time [`GUST_TIME`]: gusts of 0.14 m/s over 1.5 s change as fast. With a right gain of a
-/// vane that errs, and with a right delay in place of a lag, the level stays below 0.2 m/s.
+/// Gusts of more than this standard deviation (m/s) feign errors of the sensors. The level belongs to the correlation time
+/// [`GUST_TIME`]: gusts of 0.14 m/s over 1.5 s change as fast. A vane gain of 9 % that is not freed looks like 0.1 m/s.
 const FEIGNING: f64 = 0.5;
 /// Residuals beyond this number of standard deviations are down-weighted.
 const BOUND: f64 = 4.0;

@@ -1,8 +1,7 @@
 //! The errors-in-variables bias of nonlinear candidates. A candidate is a physical effect that the model may lack. Its columns
 //! (regressors) at a point of linearisation hold the same sensor noise as the residual, as those of linear candidates do.
 //!
-//! Without their own bias, such columns would get the bias of the columns of the model's coefficients that are projected out of
-//! them, with the wrong sign: in gusts a stall without existence would have an evidence of several hundred.
+//! Without their own bias, such columns would get that of the model's columns that are projected out of them, with the wrong sign.
 
 use rayon::prelude::*;
 
