@@ -229,7 +229,7 @@ fn the_box_says_where_the_tuned_model_fails() {
                 (unexplained: 9 % tuned by equation error, 2 % with it).";
     let both = Answer { acts: acts.into(), ..answer.clone() };
     let page = text(&DiagnosisReport { answer: Some(&both), ..report(&d, None) }.page().render());
-    assert!(page.contains("Seen best: lift with angle of attack."), "{page}");
+    assert!(page.contains("Its curve: lift over angle of attack."), "{page}");
     assert!(!page.contains("Where it fails: lift") && page.matches(acts).count() == 2, "{page}");
 
     d.verdict = Verdict::Adequate;

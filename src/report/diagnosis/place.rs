@@ -38,16 +38,16 @@ pub(crate) fn of_diagnosis(d: &Diagnosis) -> String {
     }
 }
 
-/// Sentence on the variables over which the asserted effects show best, for an answer that names their channels. Empty without a
+/// Sentence on the curves of the asserted effects, for an answer that names their channels. Empty without a
 /// curve of an effect.
 pub(crate) fn variables(d: &Diagnosis) -> String {
     let asserted = d.effects.iter().filter(|c| c.asserted);
     let curves = asserted.filter_map(|c| c.curve.as_ref());
     let all: Vec<String> =
-        curves.map(|c| format!("{} with {}", name(&c.channel), plain(&c.variable))).collect();
+        curves.map(|c| format!("{} over {}", name(&c.channel), plain(&c.variable))).collect();
     match all.is_empty() {
         true => String::new(),
-        false => format!("Seen best: {}.", all.join("; ")),
+        false => format!("Its curve: {}.", all.join("; ")),
     }
 }
 

@@ -33,7 +33,7 @@ pub(crate) fn ranking(d: &Diagnosis) -> Section {
     let rest = || d.effects.iter().filter(|c| !seen.contains(&c.id.as_str()));
     let above = |c: &&Candidate| c.evidence > c.threshold;
     groups.push(EvidenceGroup {
-        title: "Above chance, but refused".into(),
+        title: "Above chance, but not asserted".into(),
         note: String::new(),
         style: Style::Fourth,
         rows: rest().filter(above).map(row).collect(),
@@ -121,7 +121,7 @@ pub(crate) fn curves(d: &Diagnosis) -> Section {
     let found: Vec<&str> = d.effects.iter().filter(|c| c.asserted).map(|c| c.id.as_str()).collect();
     let mut beside = match (found.len(), options.len()) {
         (0, _) => {
-            " An interval without zero proves no suspect: its evidence must exceed chance as well."
+            " An interval without zero proves no suspect: its evidence must exceed chance, and no check may refuse it."
                 .into()
         }
         (some, all) if some < all => {
@@ -138,9 +138,9 @@ pub(crate) fn curves(d: &Diagnosis) -> Section {
         beside += &format!(" {}, the nearest, has no curve over a single variable.", first.id);
     }
     let note = format!(
-        "What the flights show that the tuned model without the effect does not (points, \
-         averages over about 0.4 s), and what the effect contributes as fitted, with its \
-         95 % interval.{beside}"
+        "Partial residuals (points, averages over about 0.4 s): the measured value less all other terms of the \
+         fit, and what the effect contributes in it, with its 95 % interval. Tuning without the effect leaves less, \
+         because other coefficients take up a part of it.{beside}"
     );
     // the title must not present candidates that are not asserted as findings
     let title = if found.is_empty() { "Nearest suspects, none proven" } else { "The effect" };
@@ -160,7 +160,7 @@ fn plot(c: &Candidate, curve: &Curve) -> XyFigure {
     XyFigure {
         title: format!("{} over {}", channel_of(&curve.channel), plain(&curve.variable)),
         x_label: curve.variable.clone(),
-        y_label: format!("Measured − tuned model ({})", curve.unit),
+        y_label: format!("Partial residual ({})", curve.unit),
         bands: vec![XyBand {
             label: "95 % interval".into(),
             x: curve.at.clone(),
@@ -169,7 +169,7 @@ fn plot(c: &Candidate, curve: &Curve) -> XyFigure {
         }],
         series: vec![
             XySeries {
-                label: "measured".into(),
+                label: "partial residuals".into(),
                 style: Style::Measured,
                 mark: XyMark::Dots,
                 x: some(&curve.x),

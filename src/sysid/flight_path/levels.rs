@@ -146,15 +146,16 @@ impl Levels {
         self.gusts * (1.0 - self.gust_kept(step).powi(2)).sqrt()
     }
 
-    /// These levels with air-data sensors that have white noise alone, beside gusts that are estimated: see
-    /// [`noise::white_beside_walk`]. Stated levels stay.
+    /// These levels with vanes that have white noise alone, beside gusts that are estimated: see [`noise::white_beside_walk`].
+    /// Stated levels stay. So does that of the airspeed: the standard deviation of its estimate is larger than a gust's change in
+    /// a sample, which would take up the difference.
     pub fn beside_gusts(mut self, log: &Log) -> Levels {
         let readings = |of: &dyn Fn(&Track, usize) -> f64| {
             noise::white_beside_walk(
                 log.tracks.iter().map(|t| (0..t.len()).map(|k| of(t, k)).collect::<Vec<f64>>()),
             )
         };
-        for (channel, floor) in FLOORS.iter().enumerate().take(6).skip(3) {
+        for (channel, floor) in FLOORS.iter().enumerate().take(6).skip(4) {
             let white = readings(&|t, k| measurement::measured(t, channel, k));
             if !self.stated[channel] && white.is_finite() {
                 self.measured[channel] = self.measured[channel].min(white.max(*floor));

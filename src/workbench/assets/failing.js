@@ -40,7 +40,7 @@ function welcome() {
     ["3", "Tick a suspect", "the model is fitted with it; the error falls on a flight held out, tuning and effect apart"],
     ["4", "Judge, save, fly", "test flights stay unseen until then; the saved model is the command line's"]];
   return [el("ol", { class: "welcome" }, steps.map(([k, what, why]) => el("li", {}, el("b", {}, what), ` – ${why}`))),
-    el("figure", {}, picture(), el("figcaption", {}, "What a diagnosis shows: dots are what the tuned model leaves of the drag, the line is the missing effect.")),
+    el("figure", {}, picture(), el("figcaption", {}, "What a diagnosis shows: dots are what the other terms of the fit leave of the drag, the line is the missing effect.")),
     el("p", { class: "note" }, "No log at hand? These two fly flights with a hidden effect, and open them with the model that lacks it: ", el("code", {}, "greylag mystery --seed 3 --out mystery && greylag workbench mystery/*.csv --model mystery/model.toml"))];
 }
 /** Picture of a diagnosis: a residual over a variable, and the curve of the effect. */

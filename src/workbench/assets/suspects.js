@@ -101,7 +101,7 @@ function suspect(bench, e, most) {
     el("p", { class: "muted" }, e.description),
     // the numbers come before the curve, which a low window cuts off
     el("p", {}, `Evidence ${show(e.evidence)}; chance reaches ${show(e.threshold)}. `, facts.filter(Boolean).join("; "), "."),
-    e.curve && above ? el("figure", {}, el("figcaption", {}, el("b", {}, `${e.curve.channel} (${e.curve.unit}) over ${e.curve.variable}`), el("span", { class: "muted" }, "dots: what the model tuned by equation error leaves; line: the effect")), el("div", { class: "plot", "data-curve": e.id })) : "",
+    e.curve && above ? el("figure", {}, el("figcaption", {}, el("b", {}, `${e.curve.channel} (${e.curve.unit}) over ${e.curve.variable}`), el("span", { class: "muted" }, "dots: partial residuals (measured less all other terms of the fit with the effect); line: the effect")), el("div", { class: "plot", "data-curve": e.id })) : "",
     el("div", { class: "meter", role: "img", "aria-label": `evidence ${show(e.evidence)}, chance reaches ${show(e.threshold)}`, title: `evidence ${show(e.evidence)}; chance reaches ${show(e.threshold)} (log scale)` },
       el("i", { vars: { width: `${log(e.evidence)}%` } }), el("b", { vars: { left: `${log(e.threshold)}%` } })),
     ...e.refused.map((why) => el("p", { class: "bad" }, why)),

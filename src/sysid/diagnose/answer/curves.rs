@@ -50,8 +50,8 @@ pub fn curve(
 /// Computes the curve of an effect in the channel `id` over the regime variable that explains most of the
 /// contribution's variance.
 ///
-/// `made` holds the contribution in each window, and `scatter` the measured value minus that of the model without the effect,
-/// both in the channel's unit. `regimes` holds the regime variables of each window. `relative` is the standard deviation of the
+/// `made` holds the contribution in each window, and `scatter` the partial residual (see [`Curve::residual`]), both in the
+/// channel's unit. `regimes` holds the regime variables of each window. `relative` is the standard deviation of the
 /// contribution relative to its value.
 pub fn over_the_best(
     id: ChannelId,

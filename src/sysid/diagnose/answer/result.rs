@@ -185,7 +185,8 @@ pub struct Curve {
     pub unit: String,
     /// Value of the flight variable in each window (a short stretch of flight).
     pub x: Vec<f64>,
-    /// Measured value minus the prediction of the re-estimated model without the effect, in each window.
+    /// Partial residual in each window: the measured value minus all other terms of the fit with the effect. For an effect that is not
+    /// part of the fit, the residual of the fit.
     pub residual: Vec<f64>,
     /// Values of the flight variable at which the contribution is given.
     pub at: Vec<f64>,

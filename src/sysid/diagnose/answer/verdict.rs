@@ -85,8 +85,9 @@ fn adequate(effects: &[Candidate]) -> String {
             )
         }
         _ if c.heldout_error_reduction < HELD_OUT => format!(
-            "Nothing is missing that matters: the nearest, {id}, takes only {share:.0} % of the error on held-out \
-             segments ({:.0} % is asked).",
+            "Nothing is missing that matters: the nearest, {id}, takes {} of the error on held-out segments \
+             ({:.0} % is asked).",
+            if share < 0.5 { "nothing".into() } else { format!("only {share:.0} %") },
             100.0 * HELD_OUT
         ),
         Some(why) => {

@@ -1,0 +1,76 @@
+"""Settled error of several controllers, target by target, and what each differs from the first by.
+
+    python python/benches/paired_targets.py write results/campaign-paper-targets.csv policy=A/evaluation.json hybrid=B/evaluation.json
+    python python/benches/paired_targets.py print results/campaign-paper-targets.csv
+
+``write`` keeps the settled errors (degrees) of evaluations (``greylag evaluate --json``) of the same targets in one table. ``print``
+gives each controller's mean error and the mean of its differences from the first controller, paired by target, with 95 %
+percentile-bootstrap intervals over the targets (10,000 resamples, seed 1). These intervals hold no scatter of training: for one
+policy they say what other targets would give, not what another seed would.
+"""
+
+import csv
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+USAGE = "give write TABLE.csv NAME=EVALUATION.json …, or print TABLE.csv"
+
+
+def write(table: Path, named: list[str]) -> None:
+    """Writes ``table`` from the evaluations ``named``, each NAME=FILE."""
+    columns: dict[str, list[float]] = {}
+    keys: list[tuple[str, float, float]] = []
+    for one in named:
+        name, _, path = one.partition("=")
+        flights = json.loads(Path(path).read_text())["controllers"][0]["flights"]
+        own = [(f["targets"], *f["to_deg"][:2]) for f in flights]
+        if keys and own != keys:
+            raise SystemExit(f"{path}: its targets are not those of the first evaluation; evaluate the same targets")
+        keys, columns[name] = own, [f["settled_deg"] for f in flights]
+    with table.open("w", newline="") as out:
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow(["group", "roll_deg", "pitch_deg", *columns])
+        for k, key in enumerate(keys):
+            writer.writerow([*key, *(f"{errors[k]:.4f}" for errors in columns.values())])
+
+
+def with_interval(values: np.ndarray) -> str:
+    """Mean of ``values`` with its bootstrap interval."""
+    drawn = np.random.default_rng(1).integers(len(values), size=(10_000, len(values)))
+    low, high = np.percentile(values[drawn].mean(axis=1), [2.5, 97.5])
+    return f"{values.mean():.3f} [{low:.3f}, {high:.3f}]"
+
+
+def show(table: Path) -> None:
+    """Prints the means and differences of all groups."""
+    with table.open() as read:
+        rows = list(csv.DictReader(read))
+    names = [name for name in rows[0] if name not in ("group", "roll_deg", "pitch_deg")]
+    groups = list(dict.fromkeys(row["group"] for row in rows))
+    for group in ["all", *groups]:
+        own = [row for row in rows if group in ("all", row["group"])]
+        first = np.array([float(row[names[0]]) for row in own])
+        print(f"\n{group}, {len(own)} targets: settled error, degrees\n")
+        print(f"| controller | mean | less {names[0]} |\n|---|---|---|")
+        for name in names:
+            errors = np.array([float(row[name]) for row in own])
+            less = "–" if name == names[0] else with_interval(errors - first)
+            print(f"| `{name}` | {with_interval(errors)} | {less} |")
+
+
+def main() -> None:
+    """Reads the command line."""
+    match sys.argv[1:]:
+        case ["write", table, *named] if named:
+            write(Path(table), named)
+        case ["print", table]:
+            show(Path(table))
+        case _:
+            raise SystemExit(USAGE)
+
+
+if __name__ == "__main__":
+    main()
