@@ -22,7 +22,8 @@ use greylag_model::GreyBox;
 /// Prior standard deviation of each misalignment angle, °: a board mounted by eye.
 const MOUNTED_DEG: f64 = 3.0;
 /// The second search is made only if the angles reduce the residual by at least this share of the best effect's
-/// reduction.
+/// reduction. With several selected effects any reduction beyond chance suffices: beside a strong effect, such as a rate limit,
+/// the board's angles may explain a weaker one.
 const WORTH: f64 = 0.3;
 
 /// Returns the better explanation of the flights of `problem`: `found`, or a search result with misaligned axes. If
@@ -69,7 +70,8 @@ fn worth(problem: &Problem, found: &Found) -> Option<Problem> {
     let taken = left(first) - left(&turned);
     let best = found.selected.first().map(|s| s.score.fall);
     let best = best.or(found.scores.first().map(|(_, s)| s.fall)).unwrap_or(0.0);
-    (taken > WORTH * best && taken > found.threshold).then_some(tilted)
+    let enough = found.selected.len() > 1 || taken > WORTH * best;
+    (enough && taken > found.threshold).then_some(tilted)
 }
 
 /// Sum of squares of the whitened residual of `round`.
