@@ -59,7 +59,7 @@ pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
     start(&mut found, problem);
     calm(problem, &mut found, 0)?;
     let before = found.clone();
-    let mut freed = problem.clone();
+    let mut freed = *problem;
     free(&mut freed, &mut found, &[])?;
     let rough = rough(&freed, &found, &singular)?;
     match rough {
@@ -76,7 +76,7 @@ fn in_gusts(problem: &Problem, before: &Found) -> Result<Found, ReconstructError
     let singular = || no_path(&problem.options.name, "the equations became singular");
     let mut held = calibration::OF_AIR.to_vec();
     loop {
-        let (mut freed, mut found) = (problem.clone(), before.clone());
+        let (mut freed, mut found) = (*problem, before.clone());
         // gusts tell nothing of the delays of the air-data sensors either
         LATE.iter().for_each(|place| freed.widths[*place] *= nuisance::HELD);
         calm(&freed, &mut found, FIRST)?;

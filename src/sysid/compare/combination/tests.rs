@@ -71,7 +71,7 @@ fn with_few_runs_the_weights_are_equal() {
 fn the_mean_of_roll_angles_beside_a_half_turn_is_a_half_turn() {
     let instant = |k: usize| Instant {
         time_s: 0.01 * k as f64,
-        state: State { roll: if k % 2 == 0 { 3.1 } else { -3.1 }, ..State::NEUTRAL },
+        state: State { roll: if k.is_multiple_of(2) { 3.1 } else { -3.1 }, ..State::NEUTRAL },
         yaw: f64::NAN,
         controls: Controls::default(),
         command: None,
