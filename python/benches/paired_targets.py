@@ -3,7 +3,8 @@
     python python/benches/paired_targets.py write results/campaign-paper-targets.csv policy=A/evaluation.json hybrid=B/evaluation.json
     python python/benches/paired_targets.py print results/campaign-paper-targets.csv
 
-``write`` keeps the settled errors (degrees) of evaluations (``greylag evaluate --json``) of the same targets in one table. ``print``
+``write`` keeps the settled errors (degrees) of evaluations (``greylag evaluate --json``) in one table, of the targets that all of them
+have. ``print``
 gives each controller's mean error and the mean of its differences from the first controller, paired by target, with 95 %
 percentile-bootstrap intervals over the targets (10,000 resamples, seed 1). These intervals hold no scatter of training: for one
 policy they say what other targets would give, not what another seed would.
@@ -20,21 +21,20 @@ USAGE = "give write TABLE.csv NAME=EVALUATION.json …, or print TABLE.csv"
 
 
 def write(table: Path, named: list[str]) -> None:
-    """Writes ``table`` from the evaluations ``named``, each NAME=FILE."""
-    columns: dict[str, list[float]] = {}
-    keys: list[tuple[str, float, float]] = []
+    """Writes ``table`` from the evaluations ``named``, each NAME=FILE: the targets that all of them have."""
+    columns: dict[str, dict[tuple[str, float, float], float]] = {}
     for one in named:
         name, _, path = one.partition("=")
         flights = json.loads(Path(path).read_text())["controllers"][0]["flights"]
-        own = [(f["targets"], *f["to_deg"][:2]) for f in flights]
-        if keys and own != keys:
-            raise SystemExit(f"{path}: its targets are not those of the first evaluation; evaluate the same targets")
-        keys, columns[name] = own, [f["settled_deg"] for f in flights]
+        columns[name] = {(f["targets"], *f["to_deg"][:2]): f["settled_deg"] for f in flights}
+    common = [key for key in next(iter(columns.values())) if all(key in errors for errors in columns.values())]
+    if not common:
+        raise SystemExit("the evaluations have no target in common; evaluate the same targets")
     with table.open("w", newline="") as out:
         writer = csv.writer(out, lineterminator="\n")
         writer.writerow(["group", "roll_deg", "pitch_deg", *columns])
-        for k, key in enumerate(keys):
-            writer.writerow([*key, *(f"{errors[k]:.4f}" for errors in columns.values())])
+        for key in common:
+            writer.writerow([*key, *(f"{errors[key]:.4f}" for errors in columns.values())])
 
 
 def with_interval(values: np.ndarray) -> str:
