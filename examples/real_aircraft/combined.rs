@@ -6,7 +6,7 @@ use greylag::model::GreyBox;
 use greylag::sysid::amend::leave_one_out::Scored;
 use greylag::sysid::compare::arx::{Arx, Choice as OfArx};
 use greylag::sysid::compare::combination::{
-    Chosen, Combination, EVERY_S, Forecasts, choose, usual_state,
+    Chosen, Combination, EVERY_S, Forecasts, choose, mean_state,
 };
 use greylag::sysid::compare::correction::Correction;
 use greylag::sysid::compare::free_run::START_EVERY_S;
@@ -28,7 +28,7 @@ pub struct Fold {
     /// All other parts.
     others: Vec<Prepared>,
     /// Mean state of the others, in the units of the state.
-    usual: [f64; 8],
+    mean_state: [f64; 8],
 }
 
 /// All `parts`, each left out in turn.
@@ -36,7 +36,7 @@ pub fn folds(parts: &[Prepared]) -> Vec<Fold> {
     let fold = |left: usize| {
         let mut others = parts.to_vec();
         let test = others.remove(left);
-        Fold { test, usual: usual_state(&others), others }
+        Fold { test, mean_state: mean_state(&others), others }
     };
     (0..parts.len()).map(fold).collect()
 }
@@ -72,9 +72,10 @@ fn forecasts(
     test: &Prepared,
     kind: Kind,
     every_s: f64,
-    usual: [f64; 8],
+    mean_state: [f64; 8],
 ) -> Forecasts {
-    let of = |correction| Forecasts::of_model(model, test, &HORIZONS_S, every_s, correction, usual);
+    let of =
+        |correction| Forecasts::of_model(model, test, &HORIZONS_S, every_s, correction, mean_state);
     match kind {
         Kind::Nothing => of(None),
         Kind::Observer(observer) => of(Some(Correction::Observer(observer))),
@@ -91,7 +92,7 @@ fn forecasts(
 fn of_structure(models: &[Option<GreyBox>], folds: &[&Fold], kind: Kind) -> Option<Chosen> {
     let one = |(model, fold): (&Option<GreyBox>, &&Fold)| {
         let model = model.as_ref()?;
-        Some(forecasts(model, &fold.others, &fold.test, kind, EVERY_S, fold.usual))
+        Some(forecasts(model, &fold.others, &fold.test, kind, EVERY_S, fold.mean_state))
     };
     choose(&models.iter().zip(folds).filter_map(one).collect::<Vec<_>>())
 }
@@ -149,8 +150,8 @@ pub fn best(scored: &[Scored], first: usize, folds: &[Fold], kinds: &[Kind]) -> 
 
 /// Errors on `test` of `model`, fitted to `seen`, combined as `choices` say.
 pub fn errors(model: &GreyBox, seen: &[Prepared], test: &Prepared, choices: &Choices) -> Row {
-    let usual = usual_state(seen);
-    let runs = forecasts(model, seen, test, choices.kind, START_EVERY_S, usual);
+    let mean_state = mean_state(seen);
+    let runs = forecasts(model, seen, test, choices.kind, START_EVERY_S, mean_state);
     scaled(&choices.combination.scores(&runs))
 }
 
@@ -166,10 +167,10 @@ pub fn without_model(
     let mut parts = Vec::new();
     for fold in folds {
         let Ok(arx) = Arx::fit(&fold.others, choice) else { continue };
-        let of = [scale, fold.usual];
+        let of = [scale, fold.mean_state];
         parts.push(Forecasts::of_arx(&arx, &fold.test, &HORIZONS_S, EVERY_S, of)?);
     }
-    let of = [scale, usual_state(seen)];
+    let of = [scale, mean_state(seen)];
     let runs = Forecasts::of_arx(arx, &test[0], &HORIZONS_S, START_EVERY_S, of)?;
     let chosen = |parts: &[Forecasts]| {
         let equal = || Combination::equal(HORIZONS_S.len());

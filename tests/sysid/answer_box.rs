@@ -290,8 +290,8 @@ fn where_the_effect_acts(compared: &Value, story: &Value, log: &str) {
         for (key, channels) in
             [("given", &models[0]["channels"]), ("tuned", &own), ("after", &models[1]["channels"])]
         {
-            let (told, wanted) = (act[key].as_f64().unwrap(), share(channels, act));
-            assert!((told - wanted).abs() <= 1e-6 * wanted.abs(), "{key} {act}: {wanted}");
+            let (stated, computed) = (act[key].as_f64().unwrap(), share(channels, act));
+            assert!((stated - computed).abs() <= 1e-6 * computed.abs(), "{key} {act}: {computed}");
         }
         falls.push(act["tuned"].as_f64().unwrap() - act["after"].as_f64().unwrap());
     }

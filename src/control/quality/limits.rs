@@ -58,23 +58,23 @@ pub struct OutsideS {
 /// A limit of the flight envelope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limit {
-    /// Largest bank.
+    /// Bank beyond [`Limits::bank_deg`].
     Bank,
-    /// Smallest or largest pitch.
+    /// Pitch outside [`Limits::pitch_deg`].
     Pitch,
-    /// Largest load factor.
+    /// Load factor above the second of [`Limits::load_factor`].
     LoadFactor,
-    /// Smallest load factor.
+    /// Load factor below the first of [`Limits::load_factor`].
     LeastLoadFactor,
-    /// Stall angle of attack.
+    /// Angle of attack above [`Limits::stall_deg`].
     Stall,
-    /// Largest sideslip.
+    /// Sideslip beyond [`Limits::sideslip_deg`].
     Sideslip,
-    /// Smallest airspeed.
+    /// Airspeed below the first of [`Limits::airspeed_mps`].
     LeastAirspeed,
-    /// Largest airspeed.
+    /// Airspeed above the second of [`Limits::airspeed_mps`].
     LargestAirspeed,
-    /// Largest rate of a surface command.
+    /// Rate of a surface command beyond [`Limits::slew_per_s`].
     SurfaceRate,
 }
 

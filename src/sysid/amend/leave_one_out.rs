@@ -13,7 +13,7 @@ use super::judge::{IMPROVED, Judge, judged, judged_at};
 use super::linear_residual;
 use super::output_error::{self, FitOptions};
 use super::parameters;
-use crate::compare::combination::{EVERY_S, Forecasts, choose as choose_weights, usual_state};
+use crate::compare::combination::{EVERY_S, Forecasts, choose as choose_weights, mean_state};
 use crate::compare::forecast;
 use crate::flight_path::reconstruction::Reconstruction;
 use crate::per_flight::known::put_right;
@@ -237,9 +237,16 @@ impl Set<'_> {
         let one = |(left, model): (&usize, &Option<GreyBox>)| {
             let others = self.judged.iter().enumerate().filter(|(k, _)| k != left);
             let others: Vec<&Prepared> = others.map(|(_, f)| &f.prepared).collect();
-            let of = usual_state(others);
+            let mean_state = mean_state(others);
             let flight = &self.judged[*left].prepared;
-            Some(Forecasts::of_model(model.as_ref()?, flight, &[self.at], EVERY_S, None, of))
+            Some(Forecasts::of_model(
+                model.as_ref()?,
+                flight,
+                &[self.at],
+                EVERY_S,
+                None,
+                mean_state,
+            ))
         };
         let parts: Vec<Forecasts> = self.judges.par_iter().zip(models).filter_map(one).collect();
         let chosen = choose_weights(&parts)?;

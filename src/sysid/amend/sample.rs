@@ -24,25 +24,34 @@ pub fn flight(model: &GreyBox, name: &str, count: u32, phase: f64) -> Reconstruc
             throttle: 0.5 + 0.2 * (0.7 * t).sin(),
             ..Controls::default()
         };
-        let at = Instant {
-            time_s,
-            state,
-            yaw: f64::NAN,
-            controls,
-            command: None,
-            specific_force: [f64::NAN; 3],
-            altitude: 600.0,
-            density: 1.225,
-        };
+        let at = Instant { controls, ..instant(time_s, state) };
         state = model.step(&state, &controls, 600.0, &mut memory);
         at
     });
+    reconstruction(name, instants.collect())
+}
+
+/// A sample at `time_s` (s) without forces and with deflections of zero.
+pub fn instant(time_s: f64, state: State) -> Instant {
+    Instant {
+        time_s,
+        state,
+        yaw: f64::NAN,
+        controls: Controls::default(),
+        command: None,
+        specific_force: [f64::NAN; 3],
+        altitude: 600.0,
+        density: 1.225,
+    }
+}
+
+/// A flight of `instants` with stated standard deviations of 0.001, and of 0.1 m/s² for the forces.
+pub fn reconstruction(name: &str, instants: Vec<Instant>) -> Reconstruction {
     Reconstruction {
-        segments: vec![Segment { instants: instants.collect() }],
+        segments: vec![Segment { instants }],
         noise: [1e-3; 8],
         left: [1e-3; 8],
         force_noise: [0.1; 3],
-        gust_step: 0.0,
         ..Reconstruction::empty(name)
     }
 }

@@ -1,4 +1,4 @@
-//! Combination of forecasts: what a model, the state at the start and the usual state predict together.
+//! Combination of forecasts: what a model, the state at the start and the mean state predict together.
 //!
 //! The combined forecast of a state at the horizon h is x̂(h) = x₀ + w(h) (x_m(h) − x₀) + c(h) (x̄ − x₀). x₀ is the state at the
 //! start of the run, x_m(h) the model's prediction, and x̄ the mean state of the flights to which the model was fitted. w is the
@@ -35,7 +35,7 @@ pub struct Forecasts {
     horizons_s: Vec<f64>,
     runs: Vec<Ahead>,
     scale: [f64; 8],
-    usual: [f64; 8],
+    mean_state: [f64; 8],
 }
 
 /// Which states have the same weights.
@@ -80,17 +80,17 @@ pub struct Chosen {
 
 impl Forecasts {
     /// Free runs of `model` along `flight` from starts every `every_s` (s) to each of `horizons_s` (s, ascending), with its rates
-    /// corrected by `correction`. `usual` is the mean of the eight states (units of the state) of other flights.
+    /// corrected by `correction`. `mean_state` is the mean of the eight states (units of the state) of other flights.
     pub fn of_model(
         model: &GreyBox,
         flight: &Prepared,
         horizons_s: &[f64],
         every_s: f64,
         correction: Option<Correction>,
-        usual: [f64; 8],
+        mean_state: [f64; 8],
     ) -> Forecasts {
         let runs = free_run::ahead(model, flight, horizons_s, every_s, correction);
-        Forecasts { horizons_s: horizons_s.to_vec(), runs, scale: model.scale(), usual }
+        Forecasts { horizons_s: horizons_s.to_vec(), runs, scale: model.scale(), mean_state }
     }
 
     /// Runs of an ARX forecast, as [`Forecasts::of_model`]. `scale` divides distances and has the units of the state.
@@ -102,12 +102,12 @@ impl Forecasts {
         flight: &Prepared,
         horizons_s: &[f64],
         every_s: f64,
-        [scale, usual]: [[f64; 8]; 2],
+        [scale, mean_state]: [[f64; 8]; 2],
     ) -> Result<Forecasts, ArxError> {
         arx.sampled_as(flight)?;
         let forecast = Forecast::Linear(arx.clone());
         let runs = forecast::ahead(&forecast, flight, scale, horizons_s, every_s);
-        Ok(Forecasts { horizons_s: horizons_s.to_vec(), runs, scale, usual })
+        Ok(Forecasts { horizons_s: horizons_s.to_vec(), runs, scale, mean_state })
     }
 
     /// The same runs of a forecast that holds the state at the start.
@@ -122,16 +122,16 @@ impl Forecasts {
 
 /// Mean over all samples of `flights` of the eight states, in their units; the roll angle's is that of the mean direction. NaN
 /// without samples.
-pub fn usual_state<'a>(flights: impl IntoIterator<Item = &'a Prepared>) -> [f64; 8] {
+pub fn mean_state<'a>(flights: impl IntoIterator<Item = &'a Prepared>) -> [f64; 8] {
     let all: Vec<[f64; 8]> = flights
         .into_iter()
         .flat_map(|f| f.segments.iter().flatten())
         .map(|at| at.state.to_array())
         .collect();
     let over = |of: &dyn Fn(&[f64; 8]) -> f64| mean(&all.iter().map(of).collect::<Vec<_>>());
-    let mut usual = std::array::from_fn(|k| over(&|state| state[k]));
-    usual[0] = over(&|state| state[0].sin()).atan2(over(&|state| state[0].cos()));
-    usual
+    let mut mean_state = std::array::from_fn(|k| over(&|state| state[k]));
+    mean_state[0] = over(&|state| state[0].sin()).atan2(over(&|state| state[0].cos()));
+    mean_state
 }
 
 impl Pooled {
@@ -174,11 +174,11 @@ impl Combination {
 
     /// Errors of the combined forecast on the flight of `forecasts`, one for each horizon.
     pub fn scores(&self, forecasts: &Forecasts) -> Vec<HorizonScore> {
-        let Forecasts { horizons_s, runs, scale, usual } = forecasts;
+        let Forecasts { horizons_s, runs, scale, mean_state } = forecasts;
         let one = |run: &Ahead| {
             let pairs = run.pairs.iter().zip(&self.weights);
             let of = |(&[measured, predicted], weights): (&[[f64; 8]; 2], &[[f64; 2]; 8])| {
-                Some([measured, combined(&run.from, &predicted, usual, weights)])
+                Some([measured, combined(&run.from, &predicted, mean_state, weights)])
             };
             pairs.map(of).collect()
         };
@@ -197,10 +197,10 @@ impl Combination {
 fn combined(
     from: &[f64; 8],
     predicted: &[f64; 8],
-    usual: &[f64; 8],
+    mean_state: &[f64; 8],
     weights: &[[f64; 2]; 8],
 ) -> [f64; 8] {
-    let [model, mean] = [predicted, usual].map(|to| error(from, to));
+    let [model, mean] = [predicted, mean_state].map(|to| error(from, to));
     std::array::from_fn(|k| from[k] + weights[k][0] * model[k] + weights[k][1] * mean[k])
 }
 
@@ -261,7 +261,7 @@ impl Sums {
             for run in &part.runs {
                 let Some([measured, predicted]) = run.pairs.get(h) else { continue };
                 let [measured, model, mean] =
-                    [measured, predicted, &part.usual].map(|to| error(&run.from, to));
+                    [measured, predicted, &part.mean_state].map(|to| error(&run.from, to));
                 for &k in group {
                     let [y, m, c] = [measured, model, mean].map(|d| d[k] / part.scale[k]);
                     sums.gram.iter_mut().zip([m * m, m * c, c * c]).for_each(|(s, x)| *s += x);

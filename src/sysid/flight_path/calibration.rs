@@ -16,7 +16,7 @@ use crate::flight_path::nuisance::{
 /// Number of standard deviations above which a difference is significant. It is large because fifteen errors are tested in
 /// every flight, and because the noise is not quite white.
 const BEYOND_DOUBT: f64 = 6.0;
-/// Rare errors of the air-data sensors. Gusts can feign them.
+/// Rare errors of the air-data sensors, whose estimates are biased in gusts.
 ///
 /// An aircraft turns into a gust. Its motion against the mean air then has the opposite sign to the gust that the vane measures,
 /// as if the vane showed only a part of the motion. In gusts of 0.5 to 0.9 m/s, correlated over 1.5 s, vane gains of −20 to −94 %

@@ -21,9 +21,9 @@ use crate::flight_path::path::Path;
 /// of them.
 const COARSE: [f64; 4] = [0.02, 0.1, 0.5, 2.0];
 const FINE: [f64; 3] = [2.0, 1.4, 1.2];
-/// Gusts of more than this standard deviation (m/s) feign errors of the sensors. The level belongs to the correlation time
+/// Gusts of more than this standard deviation (m/s) bias the estimates of sensor errors. The level belongs to the correlation time
 /// [`GUST_TIME`]: gusts of 0.14 m/s over 1.5 s change as fast. A vane gain of 9 % that is not freed looks like 0.1 m/s.
-const FEIGNING: f64 = 0.5;
+const STRONG: f64 = 0.5;
 /// Residuals beyond this number of standard deviations are down-weighted.
 const BOUND: f64 = 4.0;
 /// Delays of the air-data sensors.
@@ -63,15 +63,15 @@ pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
     free(&mut freed, &mut found, &[])?;
     let rough = rough(&freed, &found, &singular)?;
     match rough {
-        Some(trial) if trial.levels.gusts > FEIGNING => return in_gusts(problem, &before),
+        Some(trial) if trial.levels.gusts > STRONG => return in_gusts(problem, &before),
         Some(trial) => gusty(&freed, &mut found, trial, &singular)?,
         None => (),
     }
     Ok(found)
 }
 
-/// Fits again from `before`, a fit without rare errors of the sensors, if gusts are strong. Errors that gusts can feign keep their
-/// priors. Any other error must be beyond doubt with the standard deviation that gusts give it, too.
+/// Fits again from `before`, a fit without rare errors of the sensors, if gusts are strong. Errors of the air-data sensors keep
+/// their priors, because gusts bias their estimates. Any other error must be beyond doubt with the standard deviation that gusts give it, too.
 fn in_gusts(problem: &Problem, before: &Found) -> Result<Found, ReconstructError> {
     let singular = || no_path(&problem.options.name, "the equations became singular");
     let mut held = calibration::OF_AIR.to_vec();
@@ -108,9 +108,9 @@ fn free(problem: &mut Problem, found: &mut Found, held: &[usize]) -> Result<(), 
     Ok(())
 }
 
-/// `trial`, which has strong gusts, with their most likely correlation time and level, beside white noise of the sensors.
+/// `trial`, which has strong gusts, with their most likely correlation time and level, beside white noise of the vanes.
 ///
-/// The gust's change from one sample to the next is well known, its correlation time is not. That of a usual gust overstates the
+/// The gust's change from one sample to the next is well known, its correlation time is not. The default [`GUST_TIME`] overstates the
 /// error of mean wind and biases where gusts are quick.
 fn correlated(problem: &Problem, mut trial: Found) -> Option<Found> {
     let step = problem.log.step;

@@ -1,35 +1,19 @@
 //! Tests of the selection of a structure.
 
 use super::*;
-use crate::flight_path::reconstruction::{Instant, Segment};
+use crate::amend::sample;
 use crate::progress::ignore_progress;
-use greylag_physics::{Controls, State};
+use greylag_physics::State;
 
 /// A flight of 3 s without motion.
 fn short(name: &str) -> Reconstruction {
-    let instant = |k: usize| Instant {
-        time_s: 0.01 * k as f64,
-        state: State::NEUTRAL,
-        yaw: f64::NAN,
-        controls: Controls::default(),
-        command: None,
-        specific_force: [f64::NAN; 3],
-        altitude: 600.0,
-        density: 1.225,
-    };
-    Reconstruction {
-        segments: vec![Segment { instants: (0..301).map(instant).collect() }],
-        noise: [1e-3; 8],
-        left: [1e-3; 8],
-        force_noise: [0.1; 3],
-        ..Reconstruction::empty(name)
-    }
+    let instant = |k: usize| sample::instant(0.01 * k as f64, State::NEUTRAL);
+    sample::reconstruction(name, (0..301).map(instant).collect())
 }
 
 #[test]
 fn the_model_as_given_is_not_chosen_where_no_fit_was_possible() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../params/x8/jsbsim.toml");
-    let model = GreyBox::load(std::path::Path::new(path)).unwrap();
+    let model = sample::model();
     let flights = ["a", "b", "c"].map(short);
     let tuned = Fitted::Coefficients { effects: Vec::new(), per_flight: PerFlight::default() };
     let structures = [("given", Fitted::Nothing), ("tuned", tuned)]

@@ -3,28 +3,27 @@
 use super::*;
 use crate::amend::sample;
 use crate::compare::free_run::START_EVERY_S;
-use crate::flight_path::reconstruction::{Instant, Reconstruction, Segment};
-use greylag_physics::{Controls, State};
+use greylag_physics::State;
 
 const SCALE: [f64; 8] = [1.0, 1.0, 15.0, 10.0, 10.0, 10.0, 1.0, 1.0];
 const FREE: Choice = Choice { pooled: Pooled::Each, runs: 1e-9 };
 
-/// Runs from random-like states whose measured states are `truth` of start, prediction and usual state.
+/// Runs from random-like states whose measured states are `truth` of start, prediction and mean state.
 fn flight(from: usize, truth: impl Fn(f64, f64, f64) -> f64) -> Forecasts {
     let state = |seed: f64| -> [f64; 8] {
         std::array::from_fn(|k| 0.3 * SCALE[k] * (seed * (1.7 + k as f64)).sin())
     };
-    let usual = state(0.3);
+    let mean_state = state(0.3);
     let run = |n: usize| {
         let start = state(1.0 + n as f64);
         let pair = |ahead: f64| {
             let predicted = state(50.0 + ahead + n as f64);
-            [std::array::from_fn(|k| truth(start[k], predicted[k], usual[k])), predicted]
+            [std::array::from_fn(|k| truth(start[k], predicted[k], mean_state[k])), predicted]
         };
         Ahead { from: start, pairs: vec![pair(0.0), pair(20.0)] }
     };
     let runs = (from..from + 20).map(run).collect();
-    Forecasts { horizons_s: vec![1.0, 2.0], runs, scale: SCALE, usual }
+    Forecasts { horizons_s: vec![1.0, 2.0], runs, scale: SCALE, mean_state }
 }
 
 #[test]
@@ -69,19 +68,12 @@ fn with_few_runs_the_weights_are_equal() {
 
 #[test]
 fn the_mean_of_roll_angles_beside_a_half_turn_is_a_half_turn() {
-    let instant = |k: usize| Instant {
-        time_s: 0.01 * k as f64,
-        state: State { roll: if k.is_multiple_of(2) { 3.1 } else { -3.1 }, ..State::NEUTRAL },
-        yaw: f64::NAN,
-        controls: Controls::default(),
-        command: None,
-        specific_force: [f64::NAN; 3],
-        altitude: 600.0,
-        density: 1.225,
+    let instant = |k: usize| {
+        let roll = if k.is_multiple_of(2) { 3.1 } else { -3.1 };
+        sample::instant(0.01 * k as f64, State { roll, ..State::NEUTRAL })
     };
-    let segments = vec![Segment { instants: (0..200).map(instant).collect() }];
-    let flight = Reconstruction { segments, ..Reconstruction::empty("f") };
-    let roll = usual_state([&Prepared::new(&flight, 5.0).unwrap()])[0];
+    let flight = sample::reconstruction("f", (0..200).map(instant).collect());
+    let roll = mean_state([&Prepared::new(&flight, 5.0).unwrap()])[0];
     assert!((roll.abs() - std::f64::consts::PI).abs() < 1e-9, "{roll}");
 }
 

@@ -58,7 +58,7 @@ fn through_gusts() -> Flight {
 }
 
 #[test]
-fn gusts_feign_no_gain_of_a_vane_and_leave_its_noise_as_it_is() {
+fn gusts_are_not_taken_for_a_vane_gain_and_leave_its_noise_as_it_is() {
     let options = Options::new("rough", ActuatorFigures::tustin(30.0, 0.7, 0.4, 0.2, STEP));
     let found = reconstruct(through_gusts(), &options).unwrap();
     // without the check for gusts, the gain of the vane of β was found at −0.50
