@@ -4,6 +4,7 @@ use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{self as messages, MavMessage};
 
 use super::controller::bytewise;
+use super::fields::Fields;
 use super::{Frame, decode};
 
 /// Timestamp that a message contains.
@@ -85,14 +86,10 @@ const SERVOS: [&str; 16] = [
     "servo16_raw",
 ];
 
-/// Ids of the messages that are decoded.
-const READ: [u32; 17] = [
-    messages::PARAM_VALUE_DATA::ID,
-    messages::HEARTBEAT_DATA::ID,
-    messages::EXTENDED_SYS_STATE_DATA::ID,
+/// Ids of the messages that rust-mavlink decodes.
+const READ: [u32; 13] = [
     messages::ATTITUDE_QUATERNION_DATA::ID,
     messages::ATTITUDE_DATA::ID,
-    messages::HIGHRES_IMU_DATA::ID,
     messages::RAW_IMU_DATA::ID,
     messages::SCALED_IMU_DATA::ID,
     messages::SCALED_PRESSURE_DATA::ID,
@@ -108,29 +105,66 @@ const READ: [u32; 17] = [
 
 /// Decodes a frame; `None` for a message that no reader of logs uses.
 pub fn read(frame: &Frame<'_>) -> Option<Logged> {
-    // the id is checked before decoding, because most messages of a log are not used and decoding is slow
-    READ.contains(&frame.id).then(|| decode(frame)).flatten().and_then(logged)
+    let fields = Fields(frame.payload);
+    match frame.id {
+        // Decoded by byte offset, because rust-mavlink rejects enumeration values and flags that later releases of MAVLink added.
+        messages::PARAM_VALUE_DATA::ID => Some(parameter(fields)),
+        messages::HEARTBEAT_DATA::ID => Some(Logged::Values(heartbeat(fields))),
+        messages::EXTENDED_SYS_STATE_DATA::ID => Some(Logged::Values(extended_state(fields))),
+        messages::HIGHRES_IMU_DATA::ID => Some(Logged::Values(highres_imu(fields))),
+        // the id is checked before decoding, because most messages of a log are not used and decoding is slow
+        id => READ.contains(&id).then(|| decode(frame)).flatten().and_then(logged),
+    }
+}
+
+fn parameter(fields: Fields<'_>) -> Logged {
+    let name: Vec<u8> = fields.bytes::<16>(8).into_iter().take_while(|b| *b != 0).collect();
+    let value = fields.f32(0);
+    Logged::Parameter {
+        name: String::from_utf8(name).unwrap_or_default(),
+        value: f64::from(value),
+        bytewise: bytewise(value, fields.u8(24)),
+    }
+}
+
+fn heartbeat(fields: Fields<'_>) -> Values {
+    values(
+        "HEARTBEAT",
+        Own::None,
+        &["type", "autopilot", "custom_mode"],
+        &[f64::from(fields.u8(4)), f64::from(fields.u8(5)), f64::from(fields.u32(0))],
+    )
+}
+
+fn extended_state(fields: Fields<'_>) -> Values {
+    values(
+        "EXTENDED_SYS_STATE",
+        Own::None,
+        &["vtol_state", "landed_state"],
+        &[f64::from(fields.u8(0)), f64::from(fields.u8(1))],
+    )
+}
+
+fn highres_imu(fields: Fields<'_>) -> Values {
+    const FIELDS: [&str; 9] = [
+        "xacc",
+        "yacc",
+        "zacc",
+        "xgyro",
+        "ygyro",
+        "zgyro",
+        "abs_pressure",
+        "pressure_alt",
+        "temperature",
+    ];
+    // after the gyros the message has three fields of the magnetometer, and one of the differential pressure after the pressure
+    const OFFSETS: [usize; 9] = [8, 12, 16, 20, 24, 28, 44, 52, 56];
+    let numbers = OFFSETS.map(|offset| fields.f32(offset));
+    floats("HIGHRES_IMU", Own::Micros(fields.u64(0)), &FIELDS, &numbers)
 }
 
 fn logged(message: MavMessage) -> Option<Logged> {
     Some(Logged::Values(match message {
-        MavMessage::PARAM_VALUE(m) => {
-            let name = m.param_id.to_str().unwrap_or_default().to_owned();
-            let bytewise = bytewise(m.param_value, m.param_type as u8);
-            return Some(Logged::Parameter { name, value: f64::from(m.param_value), bytewise });
-        }
-        MavMessage::HEARTBEAT(m) => values(
-            "HEARTBEAT",
-            Own::None,
-            &["type", "autopilot", "custom_mode"],
-            &[f64::from(m.mavtype as u32), f64::from(m.autopilot as u32), f64::from(m.custom_mode)],
-        ),
-        MavMessage::EXTENDED_SYS_STATE(m) => values(
-            "EXTENDED_SYS_STATE",
-            Own::None,
-            &["vtol_state", "landed_state"],
-            &[f64::from(m.vtol_state as u32), f64::from(m.landed_state as u32)],
-        ),
         MavMessage::ATTITUDE_QUATERNION(m) => floats(
             "ATTITUDE_QUATERNION",
             Own::BootMs(m.time_boot_ms),
@@ -142,32 +176,6 @@ fn logged(message: MavMessage) -> Option<Logged> {
             Own::BootMs(m.time_boot_ms),
             &["roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"],
             &[m.roll, m.pitch, m.yaw, m.rollspeed, m.pitchspeed, m.yawspeed],
-        ),
-        MavMessage::HIGHRES_IMU(m) => floats(
-            "HIGHRES_IMU",
-            Own::Micros(m.time_usec),
-            &[
-                "xacc",
-                "yacc",
-                "zacc",
-                "xgyro",
-                "ygyro",
-                "zgyro",
-                "abs_pressure",
-                "pressure_alt",
-                "temperature",
-            ],
-            &[
-                m.xacc,
-                m.yacc,
-                m.zacc,
-                m.xgyro,
-                m.ygyro,
-                m.zgyro,
-                m.abs_pressure,
-                m.pressure_alt,
-                m.temperature,
-            ],
         ),
         MavMessage::RAW_IMU(m) => values(
             "RAW_IMU",
@@ -294,5 +302,75 @@ mod tests {
             let used = MavMessage::default_message_from_id(id).and_then(logged).is_some();
             assert_eq!(used, READ.contains(&id), "{id}");
         }
+    }
+
+    /// What is read of a frame of MAVLink 2 with this payload.
+    fn of_payload(id: u32, payload: &[u8]) -> Option<Logged> {
+        let source = crate::framing::Source { system: 1, component: 1 };
+        let version = crate::framing::Version::V2;
+        read(&Frame { version, sequence: 0, source, id, payload, signed: false, bytes: &[] })
+    }
+
+    fn of_message(message: &MavMessage) -> Values {
+        use mavlink::{MavlinkVersion, Message as _};
+        let mut payload = [0; 255];
+        let len = message.ser(MavlinkVersion::V2, &mut payload);
+        numbers(of_payload(message.message_id(), &payload[..len]))
+    }
+
+    fn numbers(found: Option<Logged>) -> Values {
+        let Some(Logged::Values(values)) = found else { panic!("{found:?}") };
+        values
+    }
+
+    #[test]
+    fn fields_read_by_offset_are_those_of_the_dialect() {
+        let imu = messages::HIGHRES_IMU_DATA {
+            time_usec: 1 << 40,
+            xacc: 1.0,
+            yacc: 2.0,
+            zacc: 3.0,
+            xgyro: 4.0,
+            ygyro: 5.0,
+            zgyro: 6.0,
+            xmag: 90.0,
+            ymag: 91.0,
+            zmag: 92.0,
+            abs_pressure: 7.0,
+            diff_pressure: 93.0,
+            pressure_alt: 8.0,
+            temperature: 9.0,
+            ..Default::default()
+        };
+        let read = of_message(&MavMessage::HIGHRES_IMU(imu));
+        assert_eq!((read.topic, read.own), ("HIGHRES_IMU", Own::Micros(1 << 40)));
+        assert_eq!(read.values[..9], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]);
+        let state = messages::EXTENDED_SYS_STATE_DATA {
+            vtol_state: messages::MavVtolState::MAV_VTOL_STATE_FW,
+            landed_state: messages::MavLandedState::MAV_LANDED_STATE_IN_AIR,
+        };
+        let read = of_message(&MavMessage::EXTENDED_SYS_STATE(state));
+        assert_eq!((read.topic, &read.values[..2]), ("EXTENDED_SYS_STATE", &[4.0, 2.0][..]));
+    }
+
+    #[test]
+    fn values_that_no_release_has_yet_are_read() {
+        let heartbeat = of_payload(messages::HEARTBEAT_DATA::ID, &[7, 0, 0, 0, 240, 250, 0, 3, 3]);
+        assert_eq!(numbers(heartbeat).values[..3], [240.0, 250.0, 7.0]);
+
+        let mut flags = [0; 63];
+        flags[60..62].copy_from_slice(&[0xFF, 0xFF]);
+        assert_eq!(
+            numbers(of_payload(messages::HIGHRES_IMU_DATA::ID, &flags)).topic,
+            "HIGHRES_IMU"
+        );
+
+        let mut parameter = 1.5_f32.to_le_bytes().to_vec();
+        parameter.extend([1, 0, 0, 0]);
+        parameter.extend(b"TRIM\0\0\0\0\0\0\0\0\0\0\0\0");
+        parameter.push(99);
+        let (name, value) = ("TRIM".to_owned(), 1.5);
+        let expected = Logged::Parameter { name, value, bytewise: value };
+        assert_eq!(of_payload(messages::PARAM_VALUE_DATA::ID, &parameter), Some(expected));
     }
 }
