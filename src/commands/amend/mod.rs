@@ -91,7 +91,7 @@ pub struct Arguments {
     fit_all: bool,
     /// Write no model. Predict each log by a fit to all others, for several structures: as given, refitted, with constants per
     /// flight, wider priors, from scratch, each effect added. Report the simplest within one standard error of the best.
-    #[arg(long, conflicts_with_all = ["hold_out", "fit_all", "conventions", "from_scratch", "report", "accept_anyway"])]
+    #[arg(long, conflicts_with_all = ["hold_out", "fit_all", "conventions", "from_scratch", "widths", "report", "accept_anyway"])]
     leave_one_out: bool,
     /// Folder for model.toml, the airframe and amend.json, or for leave-one-out.json; created if missing.
     #[arg(long)]
