@@ -158,7 +158,10 @@ fn draws(problem: &Problem, found: &Found) -> Result<([f64; 8], Vec<ByAxis>), Re
         drop(erring);
         let pairs = found.paths.iter().zip(&copy);
         let samples = pairs.flat_map(|(own, copy)| {
-            copy.instants.iter().enumerate().map(move |(k, at)| (drawn(own, k), at.state.to_array()))
+            copy.instants
+                .iter()
+                .enumerate()
+                .map(move |(k, at)| (drawn(own, k), at.state.to_array()))
         });
         for (a, b) in samples {
             for (a, i) in a.iter().zip(DRAWN) {
