@@ -6,7 +6,7 @@ use greylag::model::GreyBox;
 use greylag::sysid::amend::leave_one_out::Scored;
 use greylag::sysid::compare::arx::{Arx, Choice as OfArx};
 use greylag::sysid::compare::combination::{
-    Chosen, Combination, EVERY_S, Forecasts, choose, mean_state,
+    Combination, EVERY_S, Forecasts, choose, error_alone, mean_state, simplest,
 };
 use greylag::sysid::compare::correction::Correction;
 use greylag::sysid::compare::free_run::START_EVERY_S;
@@ -15,7 +15,7 @@ use greylag::sysid::weak_form::prepared::Prepared;
 use crate::corrected::Kind;
 use crate::{HORIZONS_S, Row, scaled};
 
-/// Smallest relative decrease of the error for which another structure or correction is taken.
+/// Smallest relative decrease of the error for which a correction is taken.
 const CLEARLY: f64 = 0.01;
 
 /// Place of the model as given among the structures.
@@ -41,20 +41,40 @@ pub fn folds(parts: &[Prepared]) -> Vec<Fold> {
     (0..parts.len()).map(fold).collect()
 }
 
+/// What is combined with the held and the mean state.
+#[derive(Clone, Copy, Debug)]
+pub enum Way {
+    /// Nothing: no model.
+    NoModel,
+    /// The model with its correction.
+    Model(Kind),
+    /// The model without a correction, and ARX.
+    ModelAndArx,
+}
+
 /// What was chosen for a forecast.
 pub struct Choices {
     /// The structure, as its place among those tried.
     pub structure: usize,
-    /// The correction.
-    pub kind: Kind,
+    /// What is combined.
+    pub way: Way,
     /// The weights.
     pub combination: Combination,
 }
 
 impl Choices {
-    /// Correction and weights in words.
-    pub fn in_words(&self) -> String {
-        format!("{}, {}", self.kind.in_words(), weights(&self.combination))
+    /// What is combined, in words. `structure` is the name of the structure.
+    pub fn in_words(&self, structure: &str) -> String {
+        match self.way {
+            Way::NoModel => "no model".into(),
+            Way::Model(kind) => format!("{structure}, {}", kind.in_words()),
+            Way::ModelAndArx => format!("{structure}, and ARX"),
+        }
+    }
+
+    /// The weights of the model, in words.
+    pub fn weights(&self) -> String {
+        weights(&self.combination)
     }
 }
 
@@ -87,71 +107,110 @@ fn forecasts(
     }
 }
 
-/// The best combination of the structure `models` (one model for each of `folds`) with the correction `kind`. `None` if the parts are
-/// too short.
-fn of_structure(models: &[Option<GreyBox>], folds: &[&Fold], kind: Kind) -> Option<Chosen> {
-    let one = |(model, fold): (&Option<GreyBox>, &&Fold)| {
-        let model = model.as_ref()?;
-        Some(forecasts(model, &fold.others, &fold.test, kind, EVERY_S, fold.mean_state))
+/// A model that was fitted without a part, and this part.
+type Left<'a> = (&'a GreyBox, &'a Fold);
+
+/// The parts that `scored` predicts, each with its model. A part without a fit is left out.
+fn judged<'a>(scored: &'a Scored, folds: &'a [Fold]) -> Vec<Left<'a>> {
+    let one = |(name, model): (&String, &'a Option<GreyBox>)| {
+        Some((model.as_ref()?, folds.iter().find(|fold| fold.test.name == *name)?))
     };
-    choose(&models.iter().zip(folds).filter_map(one).collect::<Vec<_>>())
+    scored.flights.iter().zip(&scored.models).filter_map(one).collect()
 }
 
-/// The folds of the parts that `scored` predicts.
-fn judged<'a>(scored: &Scored, folds: &'a [Fold]) -> Vec<&'a Fold> {
-    let named = |name: &String| folds.iter().find(|fold| fold.test.name == *name);
-    scored.flights.iter().filter_map(named).collect()
+/// Runs along each part of its model with the correction `kind`.
+fn along(parts: &[Left], kind: Kind) -> Vec<Forecasts> {
+    let one = |(model, fold): &Left| {
+        forecasts(model, &fold.others, &fold.test, kind, EVERY_S, fold.mean_state)
+    };
+    parts.iter().map(one).collect()
+}
+
+/// `plain`, the runs along `parts`, each together with those of ARX fitted to the other parts. `None` if ARX cannot be fitted.
+fn with_arx(plain: &[Forecasts], parts: &[Left], choice: OfArx) -> Option<Vec<Forecasts>> {
+    let one = |(runs, (model, fold)): (&Forecasts, &Left)| {
+        let arx = Arx::fit(&fold.others, choice).ok()?;
+        let of = [model.scale(), fold.mean_state];
+        let second = Forecasts::of_arx(&arx, &fold.test, &HORIZONS_S, EVERY_S, of).ok()?;
+        runs.clone().beside(&second)
+    };
+    plain.iter().zip(parts).map(one).collect()
 }
 
 /// What predicts the parts left out best: alone, and combined.
 pub struct Best {
-    /// The correction with the smallest error without weights, of the structure that was chosen first.
+    /// The correction with the smallest error without weights.
     pub alone: Kind,
-    /// Structure, correction and weights of the combination.
+    /// What is combined, and the weights.
     pub combined: Choices,
 }
 
-/// Chooses among the structures `scored` and the corrections `kinds`. `first` is the place of the structure that predicts the parts
-/// best alone. Without a choice the weights are equal.
+/// Chooses the correction of the structure number `first` of `scored` among `kinds`, without weights, then what is combined: no model,
+/// the model, the model with its correction, or the model and ARX as `arx` says. The first of `kinds` is [`Kind::Nothing`].
 ///
-/// Another structure or correction than the first is taken if it lowers the error by more than 1 %.
-pub fn best(scored: &[Scored], first: usize, folds: &[Fold], kinds: &[Kind]) -> Best {
-    let mut tried = Vec::new();
-    for (structure, of) in scored.iter().enumerate().filter(|(_, s)| !s.models.is_empty()) {
-        for kind in kinds.iter().filter(|kind| structure == first || kind.is_quick()) {
-            if let Some(chosen) = of_structure(&of.models, &judged(of, folds), *kind) {
-                tried.push((structure, *kind, chosen));
-            }
-        }
+/// A correction is taken if it lowers the error by more than 1 %. So is a combination beside a simpler one. What diverges along a
+/// part is left out. Without a choice the weights are equal.
+pub fn best(
+    scored: &[Scored],
+    first: usize,
+    folds: &[Fold],
+    kinds: &[Kind],
+    arx: Option<OfArx>,
+) -> Best {
+    let fitted = scored.get(first).is_some_and(|s| !s.models.is_empty());
+    // the model as given can be combined where no part is long enough for a fit
+    let structure = if fitted { first } else { GIVEN };
+    let parts = scored.get(structure).map_or(Vec::new(), |scored| judged(scored, folds));
+    let plain = along(&parts, Kind::Nothing);
+    let alone = correction(&parts, &plain, kinds);
+    let mut ways = vec![Way::NoModel, Way::Model(Kind::Nothing)];
+    let mut runs = vec![plain.iter().map(Forecasts::held).collect(), plain.clone()];
+    if !matches!(alone, Kind::Nothing) {
+        ways.push(Way::Model(alone));
+        runs.push(along(&parts, alone));
     }
-    let least = |error: fn(&Chosen) -> f64, own: bool| {
-        let all = || tried.iter().filter(|t| !own || t.0 == first);
-        let plain = all().find(|t| t.0 == first && matches!(t.1, Kind::Nothing));
-        let best = all().min_by(|a, b| error(&a.2).total_cmp(&error(&b.2)));
-        let clearly = |b: &&(usize, Kind, Chosen)| {
-            plain.is_none_or(|p| error(&b.2) < (1.0 - CLEARLY) * error(&p.2))
-        };
-        best.filter(clearly).or(plain)
+    if let Some(both) = arx.and_then(|choice| with_arx(&plain, &parts, choice)) {
+        ways.push(Way::ModelAndArx);
+        runs.push(both);
+    }
+    let (way, combination) = match simplest(&runs) {
+        Some((place, chosen)) => (ways[place], chosen.combination),
+        None => (Way::Model(Kind::Nothing), Combination::equal(HORIZONS_S.len())),
     };
-    let alone = least(|chosen| chosen.alone, true).map_or(Kind::Nothing, |t| t.1);
-    let combined = match least(|chosen| chosen.error, false) {
-        Some((structure, kind, chosen)) => {
-            Choices { structure: *structure, kind: *kind, combination: chosen.combination.clone() }
-        }
-        // too short for a judgement, and so for a fit
-        None => Choices {
-            structure: GIVEN,
-            kind: Kind::Nothing,
-            combination: Combination::equal(HORIZONS_S.len()),
-        },
-    };
-    Best { alone, combined }
+    Best { alone, combined: Choices { structure, way, combination } }
 }
 
-/// Errors on `test` of `model`, fitted to `seen`, combined as `choices` say.
-pub fn errors(model: &GreyBox, seen: &[Prepared], test: &Prepared, choices: &Choices) -> Row {
+/// The correction among `kinds` with the smallest error on `parts` without weights. `plain` are the runs without a correction.
+fn correction(parts: &[Left], plain: &[Forecasts], kinds: &[Kind]) -> Kind {
+    let corrected = kinds.iter().filter(|kind| !matches!(kind, Kind::Nothing));
+    let scored = corrected.filter_map(|kind| Some((*kind, error_alone(&along(parts, *kind))?)));
+    let best = scored.min_by(|a, b| a.1.total_cmp(&b.1));
+    let without = error_alone(plain).unwrap_or(f64::INFINITY);
+    best.filter(|(_, error)| *error < (1.0 - CLEARLY) * without).map_or(Kind::Nothing, |b| b.0)
+}
+
+/// Errors on `test` of `model` and, if it is combined too, of `arx`, both fitted to `seen`, combined as `choices` say.
+pub fn errors(
+    model: &GreyBox,
+    arx: Option<&Arx>,
+    seen: &[Prepared],
+    test: &Prepared,
+    choices: &Choices,
+) -> Row {
     let mean_state = mean_state(seen);
-    let runs = forecasts(model, seen, test, choices.kind, START_EVERY_S, mean_state);
+    let of = |kind| forecasts(model, seen, test, kind, START_EVERY_S, mean_state);
+    let runs = match choices.way {
+        Way::NoModel => of(Kind::Nothing).held(),
+        Way::Model(kind) => of(kind),
+        Way::ModelAndArx => {
+            let scales = [model.scale(), mean_state];
+            let second = arx.and_then(|arx| {
+                Forecasts::of_arx(arx, test, &HORIZONS_S, START_EVERY_S, scales).ok()
+            });
+            let both = second.and_then(|second| of(Kind::Nothing).beside(&second));
+            both.unwrap_or_else(|| of(Kind::Nothing))
+        }
+    };
     scaled(&choices.combination.scores(&runs))
 }
 

@@ -66,11 +66,6 @@ impl Kind {
         })
     }
 
-    /// Whether the correction takes no longer than the model alone.
-    pub fn is_quick(&self) -> bool {
-        matches!(self, Kind::Nothing | Kind::Pull(_))
-    }
-
     /// The correction in words.
     pub fn in_words(&self) -> String {
         match self {

@@ -24,8 +24,10 @@ mod outside_flights;
 mod ratios;
 
 use anyhow::{Context, Result, bail};
-use greylag::model::GreyBox;
-use greylag::sysid::amend::leave_one_out::{Fitted, Scored, Structure, leave_one_out};
+use greylag::model::{GreyBox, Named};
+use greylag::sysid::amend::leave_one_out::{
+    Effort, Fitted, Scored, Structure, alternatives, leave_one_out,
+};
 use greylag::sysid::amend::{Options, Prior, Refused, amend};
 use greylag::sysid::compare::arx::{self, Arx, Choice};
 use greylag::sysid::compare::{HorizonScore, forecast, scores};
@@ -82,6 +84,8 @@ struct Judged {
     structure: String,
     /// Order and ridge of the ARX forecast whose order is chosen, in words.
     arx: String,
+    /// Mean weights in the combinations of the fitted model and of ARX, in words.
+    weights: String,
 }
 
 fn main() -> Result<()> {
@@ -117,8 +121,9 @@ fn table(only: &str) -> Result<()> {
         for left in 0..aircraft.flights.len() {
             let (fit, test) = aircraft.held_out(left);
             let judged = judged(&aircraft.model, &fit, &test, Corrections::Tried)?;
-            println!("  held out {}: {}; {}", test.name, judged.structure, judged.arx);
-            all.push(judged.errors);
+            let Judged { errors, structure, arx, weights } = judged;
+            println!("  held out {}: {structure}; {arx}; {weights}", test.name);
+            all.push(errors);
         }
         print_errors(&all);
         ratios::print(&all);
@@ -184,30 +189,32 @@ fn judged(
         errors[place] = scaled(&scores(model, test, &HORIZONS_S)?);
     }
     let kinds = if corrections == Corrections::Tried { Kind::all() } else { Kind::pulls() };
-    let best = combined::best(&scored, first, &folds, &kinds);
+    let (arx, of_arx) = chosen_arx(&seen, &seen_parts, model.scale());
+    let best =
+        combined::best(&scored, first, &folds, &kinds, arx.as_ref().map(|(_, choice)| *choice));
     if corrections == Corrections::Tried {
         errors[CORRECTED] = corrected::errors(&fitted, fit, test, best.alone)?;
         named = format!("{named}, {}", best.alone.in_words());
     }
-    let (of, other) = (&best.combined, best.combined.structure != first);
-    let together = if other { self::fitted(model, fit, of.structure) } else { fitted };
-    errors[COMBINED] = combined::errors(&together, &seen, &unseen[0], of);
-    let name = &structures()[of.structure].name;
-    named = format!("{named}; combined: {name}, {}", of.in_words());
+    let of = &best.combined;
+    let together =
+        if of.structure == first { fitted } else { self::fitted(model, fit, of.structure) };
+    let own = arx.as_ref().map(|(arx, _)| arx);
+    errors[COMBINED] = combined::errors(&together, own, &seen, &unseen[0], of);
+    named = format!("{named}; combined: {}", of.in_words(&structures(model)[of.structure].name));
+    let mut weights = of.weights();
     let forecasts = forecast::on_unseen(&seen, &unseen, model.scale(), &HORIZONS_S);
     for (row, forecast) in errors[HOLD..].iter_mut().zip(forecasts) {
         *row = scaled(&forecast.free_run);
     }
-    let (arx, mut of_arx) = chosen_arx(&seen, &seen_parts, model.scale());
     if let Some((arx, choice)) = &arx {
         errors[CHOSEN_ARX] = scaled(&arx.scores(&unseen, model.scale(), &HORIZONS_S)?);
         let flights = [&seen[..], &unseen[..]];
-        let (rows, weights) =
-            combined::without_model(arx, *choice, &folds, flights, model.scale())?;
+        let (rows, of_arx) = combined::without_model(arx, *choice, &folds, flights, model.scale())?;
         errors[COMBINED + 1..].copy_from_slice(&rows);
-        of_arx = format!("{of_arx}, {weights}");
+        weights = format!("{weights}; ARX: {of_arx}");
     }
-    Ok(Judged { errors, structure: named, arx: of_arx })
+    Ok(Judged { errors, structure: named, arx: of_arx, weights })
 }
 
 /// The scaled errors of `scores`, one for each horizon.
@@ -224,14 +231,14 @@ fn parts(fit: &[Reconstruction]) -> Vec<Reconstruction> {
     }
 }
 
-/// The structures of a fit that are tried, with their names.
-fn structures() -> Vec<Structure> {
+/// The structures of a fit of `model` that are tried, with their names. Wider priors and effects of the catalogue are screened first.
+fn structures(model: &GreyBox) -> Vec<Structure> {
     let of = |per_flight: PerFlight| Fitted::Coefficients { effects: Vec::new(), per_flight };
     let tuned = PerFlight { sensors: SensorErrors::Dropped, ..PerFlight::default() };
     let sensors = PerFlight { sensors: SensorErrors::Kept, ..tuned };
     let axes = PerFlight { askew_deg: Some(3.0), ..tuned };
     let trims = PerFlight { trims: Some(1.0), ..tuned };
-    let structures = [
+    let complete = [
         ("as given", Fitted::Nothing),
         ("tuned", of(tuned)),
         ("tuned, sensor errors of the installation", of(sensors)),
@@ -239,22 +246,32 @@ fn structures() -> Vec<Structure> {
         ("tuned, trims of each flight", of(trims)),
         ("from scratch", Fitted::FromScratch),
     ];
-    structures.map(|(name, fitted)| Structure { name: name.into(), fitted }).into()
+    let of = |(name, fitted): (&str, _)| Structure {
+        name: name.into(),
+        fitted,
+        effort: Effort::Complete,
+    };
+    let widened = |factor: f64| format!("tuned, prior widths × {factor}");
+    let screened = alternatives(model, &[], widened, |id| format!("tuned, with {id}"));
+    complete.into_iter().map(of).chain(screened).collect()
 }
 
 /// The errors of all structures on `parts` left out, the place of the one that predicts them best, and what that is. Where the parts
 /// are too short for a choice, the coefficients alone are fitted.
 fn chosen_structure(model: &GreyBox, parts: &[Reconstruction]) -> (Vec<Scored>, usize, String) {
-    let structures = structures();
+    let structures = structures(model);
     let of = |some: &[Structure]| leave_one_out(model, parts, some, &HORIZONS_S, &ignore_progress);
     match of(&structures) {
         Ok(scored) => {
             let chosen = scored.iter().position(|s| s.chosen).unwrap_or(0);
             for s in &scored {
-                eprintln!(
-                    "  LOO {:<40} {:.4} ± {:.4} {}",
-                    s.structure, s.mean, s.standard_error, s.chosen
-                );
+                let remark = match (s.chosen, s.screened) {
+                    (true, _) => "chosen",
+                    (_, true) => "screened",
+                    _ => "",
+                };
+                let Scored { structure, mean, standard_error, .. } = s;
+                eprintln!("  LOO {structure:<40} {mean:.4} ± {standard_error:.4} {remark}");
             }
             (scored, chosen, structures[chosen].name.clone())
         }
@@ -269,26 +286,26 @@ fn chosen_structure(model: &GreyBox, parts: &[Reconstruction]) -> (Vec<Scored>, 
 
 /// `model` fitted to all of `fit` with the structure number `place`; as given if no fit is possible.
 fn fitted(model: &GreyBox, fit: &[Reconstruction], place: usize) -> GreyBox {
-    let structure = &structures()[place].fitted;
-    let of = |options: Options| match amend(model, fit, fit, &options, &ignore_progress) {
+    let usual = PerFlight { sensors: SensorErrors::Dropped, ..PerFlight::default() };
+    let usual = Options { per_flight: usual, ..Options::default() };
+    let (start, options) = match &structures(model)[place].fitted {
+        Fitted::Nothing | Fitted::LinearResidual => return model.clone(),
+        Fitted::FromScratch => (model.clone(), Options { prior: Prior::Bounds, ..usual }),
+        Fitted::Widened(factor) => {
+            let wider = |c: &Named| (c.width() > 0.0).then(|| factor * c.width());
+            (model.clone().with_widths(wider), usual)
+        }
+        Fitted::Coefficients { effects, per_flight } => {
+            let (effects, per_flight) = (effects.clone(), *per_flight);
+            (model.clone(), Options { effects, refused: Refused::Kept, per_flight, ..usual })
+        }
+    };
+    match amend(&start, fit, fit, &options, &ignore_progress) {
         Ok(amended) => amended.model,
         Err(why) => {
             eprintln!("  no fit: {why}");
             model.clone()
         }
-    };
-    match structure {
-        Fitted::Nothing | Fitted::LinearResidual => model.clone(),
-        Fitted::FromScratch => {
-            let per_flight = PerFlight { sensors: SensorErrors::Dropped, ..PerFlight::default() };
-            of(Options { prior: Prior::Bounds, per_flight, ..Options::default() })
-        }
-        Fitted::Coefficients { effects, per_flight } => of(Options {
-            effects: effects.clone(),
-            refused: Refused::Kept,
-            per_flight: *per_flight,
-            ..Options::default()
-        }),
     }
 }
 

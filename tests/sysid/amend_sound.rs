@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 use crate::amend_support::{Manoeuvres, errors, flight, fly, rebuilt, sensors};
 use greylag::logs::csv;
 use greylag::model::GreyBox;
-use greylag::sysid::amend::leave_one_out::{Fitted, Structure, leave_one_out};
+use greylag::sysid::amend::leave_one_out::{Effort, Fitted, Structure, leave_one_out};
 use greylag::sysid::amend::{Added, AmendError, Options, amend};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use greylag::sysid::per_flight::PerFlight;
@@ -147,8 +147,10 @@ fn leaving_out_one_flight_after_the_other_names_the_lag() {
             effects: ids.iter().map(|id| Added { id: (*id).into(), start: None }).collect(),
             per_flight: PerFlight::default(),
         },
+        effort: Effort::Complete,
     };
-    let given = Structure { name: "given".into(), fitted: Fitted::Nothing };
+    let (fitted, effort) = (Fitted::Nothing, Effort::Complete);
+    let given = Structure { name: "given".into(), fitted, effort };
     let structures = [given, of(&[]), of(&["actuator_lag"]), of(&["actuator_lag", "motor_torque"])];
     let scored = leave_one_out(&model, &all, &structures, &[1.0, 5.0], &ignore_progress).unwrap();
     scored.iter().for_each(|s| println!("{s:?}"));
@@ -160,6 +162,16 @@ fn leaving_out_one_flight_after_the_other_names_the_lag() {
         assert!(!s.flights.contains(&"short".to_owned()) && s.mean.is_finite(), "{s:?}");
     }
     assert!(scored[2].mean < 0.5 * scored[1].mean, "{} {}", scored[2].mean, scored[1].mean);
+    // screened, the lag is found worth a complete fit, which has the same errors; four others are not
+    let [given, tuned, lag, _] = structures;
+    let quick = |structure: Structure| Structure { effort: Effort::Screened, ..structure };
+    let useless = ["motor_torque", "drag_beta2", "dihedral_alpha", "asymmetry"];
+    let useless = useless.into_iter().filter(|id| !model.has(id)).map(|id| quick(of(&[id])));
+    let structures: Vec<Structure> =
+        [given, tuned, quick(lag)].into_iter().chain(useless).collect();
+    let again = leave_one_out(&model, &all, &structures, &[1.0, 5.0], &ignore_progress).unwrap();
+    again.iter().for_each(|s| println!("{} {} {:?}", s.structure, s.screened, s.errors));
+    assert!(again[2].chosen && !again[2].screened && again[2].errors == scored[2].errors);
     let few = leave_one_out(&model, &all[..2], &structures, &[1.0], &ignore_progress);
     assert!(matches!(few, Err(AmendError::TooFewFlights { flights: 2, .. })));
 }

@@ -1,4 +1,5 @@
-//! Bounds on model coefficients, which a user gives to `greylag amend` as `--bound NAME=LEAST..MOST`.
+//! Priors of model coefficients that a user gives to `greylag amend`: bounds as `--bound NAME=LEAST..MOST`, and a factor of all
+//! standard deviations as `--widths FACTOR`.
 
 use anyhow::{Result, bail};
 
@@ -52,9 +53,35 @@ pub fn given(mut model: GreyBox, all: &[Bound]) -> Result<GreyBox> {
     Ok(model)
 }
 
+/// Returns `model` with the prior standard deviations of its coefficients multiplied by `factor`, if one is given.
+///
+/// # Errors
+/// If the factor is not positive.
+pub fn widened(model: GreyBox, factor: Option<f64>) -> Result<GreyBox> {
+    let Some(factor) = factor else { return Ok(model) };
+    if !(factor.is_finite() && factor > 0.0) {
+        bail!("--widths {factor}: give a positive factor, such as 3");
+    }
+    Ok(model.with_widths(|c| (c.width() > 0.0).then(|| factor * c.width())))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn widths_are_multiplied_and_zero_stays_held() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/prior.toml");
+        let model = GreyBox::load(&path).unwrap();
+        let wide = widened(model.clone(), Some(3.0)).unwrap();
+        for (a, b) in model.coefficients().iter().zip(wide.coefficients()) {
+            assert!((b.width() - 3.0 * a.width()).abs() < 1e-12, "{}", a.name);
+        }
+        assert!(model.coefficients().iter().any(|c| c.width() > 0.0));
+        for wrong in [0.0, -1.0, f64::NAN] {
+            assert!(widened(model.clone(), Some(wrong)).is_err());
+        }
+    }
 
     #[test]
     fn a_bound_is_a_name_and_a_range() {

@@ -10,7 +10,9 @@ use comfy_table::{CellAlignment, Table};
 use crate::commands::bar::Bar;
 use crate::commands::files::{self, Overwrite};
 use crate::model::GreyBox;
-use crate::sysid::amend::leave_one_out::{Fitted, Scored, Structure, leave_one_out};
+use crate::sysid::amend::leave_one_out::{
+    Effort, Fitted, Scored, Structure, alternatives, leave_one_out,
+};
 use crate::sysid::amend::{Added, Options};
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::per_flight::{PerFlight, SensorErrors};
@@ -29,11 +31,13 @@ const LINEAR_RESIDUAL: &str = "--tune-only, then train residual";
 /// - the same fit with additional constants of each flight: trim coefficients, misalignment angles of the sensor axes, or both,
 /// - the same fit, followed by a linear residual (`greylag train residual`),
 /// - a fit in which physical bounds are the only prior,
-/// - a fit with each of `effects` added, and with all of them added, both with the constants of each flight in `asked`.
-pub fn structures(effects: &[Added], asked: PerFlight) -> Vec<Structure> {
-    let of = |name: String, effects: &[Added], per_flight: PerFlight| Structure {
-        name,
-        fitted: Fitted::Coefficients { effects: effects.to_vec(), per_flight },
+/// - a fit with each of `effects` added, and with all of them added, both with the constants of each flight in `asked`,
+/// - screened: a fit with wider priors, and with each other effect of the catalogue that `model` lacks.
+pub fn structures(model: &GreyBox, effects: &[Added], asked: PerFlight) -> Vec<Structure> {
+    let complete =
+        |name: &str, fitted| Structure { name: name.into(), fitted, effort: Effort::Complete };
+    let of = |name: String, effects: &[Added], per_flight: PerFlight| {
+        complete(&name, Fitted::Coefficients { effects: effects.to_vec(), per_flight })
     };
     let none = PerFlight::default();
     let trims = PerFlight { trims: Some(asked.trims.unwrap_or(1.0)), ..none };
@@ -42,22 +46,23 @@ pub fn structures(effects: &[Added], asked: PerFlight) -> Vec<Structure> {
     let both = PerFlight { trims: trims.trims, ..axes };
     let sensors = PerFlight { sensors: SensorErrors::Kept, ..none };
     let mut all = vec![
-        Structure { name: "as given".into(), fitted: Fitted::Nothing },
+        complete("as given", Fitted::Nothing),
         of("--tune-only".into(), &[], none),
         of("--tune-only --sensor-errors kept".into(), &[], sensors),
         of("--tune-only --flight-trims".into(), &[], trims),
         of(format!("--tune-only --axes-askew {askew_deg}"), &[], axes),
         of(format!("--tune-only --flight-trims --axes-askew {askew_deg}"), &[], both),
-        Structure { name: LINEAR_RESIDUAL.into(), fitted: Fitted::LinearResidual },
-        Structure { name: "--tune-only --from-scratch".into(), fitted: Fitted::FromScratch },
+        complete(LINEAR_RESIDUAL, Fitted::LinearResidual),
+        complete("--tune-only --from-scratch", Fitted::FromScratch),
     ];
-    let alone =
-        effects.iter().map(|e| of(format!("--effect {}", e.id), std::slice::from_ref(e), asked));
-    all.extend(alone);
+    let with = |id: &str| format!("--effect {id}");
+    all.extend(effects.iter().map(|e| of(with(&e.id), std::slice::from_ref(e), asked)));
     if effects.len() > 1 {
         let ids: Vec<&str> = effects.iter().map(|e| e.id.as_str()).collect();
-        all.push(of(format!("--effect {}", ids.join(" ")), effects, asked));
+        all.push(of(with(&ids.join(" ")), effects, asked));
     }
+    let widened = |factor: f64| format!("--tune-only --widths {factor}");
+    all.extend(alternatives(model, effects, widened, with));
     all
 }
 
@@ -76,7 +81,7 @@ pub fn run(
     bar.go_on()?;
     drop(bar);
     println!("{}", table(&scored));
-    for s in &scored {
+    for s in scored.iter().filter(|s| !s.screened) {
         let by: Vec<String> =
             s.flights.iter().zip(&s.errors).map(|(f, e)| format!("{f} {e:.4}")).collect();
         println!("{}: {}", s.structure, by.join(", "));
@@ -133,7 +138,11 @@ fn table(scored: &[Scored]) -> Table {
     }
     let number = |x: f64| if x.is_finite() { format!("{x:.4}") } else { "–".into() };
     for s in scored {
-        let remark = if s.chosen { "chosen" } else { "" };
+        let remark = match (s.chosen, s.screened) {
+            (true, _) => "chosen",
+            (_, true) => "screened",
+            _ => "",
+        };
         let free = s.free.to_string();
         let [a, b, c] = [s.mean, s.standard_error, s.beside_best].map(number);
         table.add_row([s.structure.clone(), free, a, b, c, remark.into()]);

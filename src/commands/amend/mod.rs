@@ -80,16 +80,18 @@ pub struct Arguments {
     /// lift_linear.CL0=-2..2. The file of the amended model records the bounds.
     #[arg(long = "bound", value_name = "NAME=LEAST..MOST", num_args = 1.., value_parser = bounds::bound)]
     bounds: Vec<bounds::Bound>,
+    /// Multiply the standard deviations of the coefficients' priors by this factor.
+    #[arg(long, value_name = "FACTOR", conflicts_with = "from_scratch")]
+    widths: Option<f64>,
     /// Write the fit even if it predicts the held-out flights no better, and add effects that would be refused.
     #[arg(long)]
     accept_anyway: bool,
     /// Fit to all logs: nothing is held out, so the printed errors are those of the fitted flights.
     #[arg(long, conflicts_with = "hold_out")]
     fit_all: bool,
-    /// Write no model. Predict each log by a fit to all other logs, for several model structures: as given, refitted, with
-    /// constants per flight, from scratch, and with each effect added. Report the simplest structure within one standard error
-    /// of the best.
-    #[arg(long, conflicts_with_all = ["hold_out", "fit_all", "conventions", "from_scratch", "report", "accept_anyway"])]
+    /// Write no model. Predict each log by a fit to all others, for several structures: as given, refitted, with constants per
+    /// flight, wider priors, from scratch, each effect added. Report the simplest within one standard error of the best.
+    #[arg(long, conflicts_with_all = ["hold_out", "fit_all", "conventions", "from_scratch", "widths", "report", "accept_anyway"])]
     leave_one_out: bool,
     /// Folder for model.toml, the airframe and amend.json, or for leave-one-out.json; created if missing.
     #[arg(long)]
@@ -108,6 +110,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let path = shipped(&arguments.model);
     let overwrite = arguments.force.into();
     let model = bounds::given(read::model(&arguments.model)?, &arguments.bounds)?;
+    let model = bounds::widened(model, arguments.widths)?;
     if arguments.leave_one_out {
         return structures(arguments, &model);
     }
@@ -221,7 +224,7 @@ fn structures(arguments: &Arguments, model: &GreyBox) -> Result<ExitCode> {
     check_new(&effects, model)?;
     let taken = arguments.logs.take_in(model, ActuatorClock::AsRecorded)?;
     let effects = wanted(arguments, &effects, model, &taken.flights)?;
-    let all = leave_one_out::structures(&effects, arguments.per_flight.asked());
+    let all = leave_one_out::structures(model, &effects, arguments.per_flight.asked());
     let done = leave_one_out::run(model, &taken.flights, &all, Some(&json), overwrite)?;
     taken.notes.iter().for_each(|note| println!("note: {note}"));
     Ok(if taken.in_doubt { ExitCode::from(IN_DOUBT) } else { done })

@@ -3,27 +3,31 @@
 //! A structure states which coefficients are fitted and which effects (physical contributions to forces and moments) are added.
 //! The error of a flight is the NRMSE of free runs (open-loop simulations from measured states).
 
+mod fits;
+mod set;
+
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::amendment::{Added, joined};
 use super::error::AmendError;
 use super::flight::Flight;
-use super::judge::{IMPROVED, Judge, judged, judged_at};
-use super::linear_residual;
-use super::output_error::{self, FitOptions};
-use super::parameters;
-use crate::compare::combination::{EVERY_S, Forecasts, choose as choose_weights, mean_state};
-use crate::compare::forecast;
+use super::judge::{IMPROVED, judged_at};
+use crate::diagnose::searched;
 use crate::flight_path::reconstruction::Reconstruction;
 use crate::per_flight::known::put_right;
 use crate::per_flight::{PerFlight, SensorErrors};
 use crate::progress::{Progress, report};
-use crate::weak_form::prepared::Prepared;
+use fits::Fits;
 use greylag_model::GreyBox;
+use set::{Set, black_boxes, scores};
 
 /// Smallest number of flights for leave-one-out cross-validation.
 pub const LEAST_FLIGHTS: usize = 3;
+/// Largest number of screened structures that are then fitted.
+const FITTED_AFTER_SCREENING: usize = 3;
+/// Factors of the prior standard deviations that [`alternatives`] have.
+const WIDER: [f64; 2] = [3.0, 10.0];
 
 /// A structure to be compared.
 #[derive(Clone, Debug)]
@@ -32,6 +36,19 @@ pub struct Structure {
     pub name: String,
     /// The fitted part of the structure.
     pub fitted: Fitted,
+    /// How the fit is made.
+    pub effort: Effort,
+}
+
+/// How the fits of a structure are made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effort {
+    /// To convergence.
+    Complete,
+    /// By two Gauss–Newton steps from the fit of the model's coefficients alone, which must be among the structures. To convergence
+    /// only if the structure is then one of the three best, and within one standard error of the best complete fit. Structures with
+    /// trims or axes of each flight, from scratch or with a linear residual are always fitted to convergence.
+    Screened,
 }
 
 /// What is fitted in a structure.
@@ -46,7 +63,9 @@ pub enum Fitted {
         /// Constants estimated for each flight.
         per_flight: PerFlight,
     },
-    /// The model's coefficients, and then a linear residual of the fitted model (see [`linear_residual`]).
+    /// The model's coefficients, with their prior standard deviations multiplied by this factor.
+    Widened(f64),
+    /// The model's coefficients, and then a linear residual of the fitted model (see [`linear_residual`](super::linear_residual)).
     LinearResidual,
     /// All coefficients of the model, including those with the value zero. The physical bounds are their only prior.
     FromScratch,
@@ -72,19 +91,47 @@ pub struct Scored {
     pub flights: Vec<String>,
     /// Error of each of `flights` with the fit to all other flights; NaN if the fit failed.
     pub errors: Vec<f64>,
-    /// For each of `flights` the model that was fitted to all other flights; `None` if the fit failed. Empty for a baseline.
+    /// Whether `errors` are those of [`Effort::Screened`], without a fit to convergence. Such a structure is not chosen.
+    pub screened: bool,
+    /// For each of `flights` the model that was fitted to all other flights; `None` if the fit failed. Empty for a baseline and a
+    /// screened structure.
     #[serde(skip)]
     pub models: Vec<Option<GreyBox>>,
     /// Mean of `errors`; infinite if one of them is NaN.
     pub mean: f64,
     /// Standard error of `mean`, from the scatter of `errors`.
     pub standard_error: f64,
-    /// The same model together with the held and the mean state; `None` for a baseline.
+    /// The same model together with the held and the mean state; `None` for a baseline and a screened structure.
     pub combined: Option<Combined>,
     /// Standard error of the mean difference from the best structure's errors, flight by flight. NaN for a baseline.
     pub beside_best: f64,
     /// Whether the structure is chosen: the simplest structure within one standard error of the best.
     pub chosen: bool,
+}
+
+/// Structures beside a fit of the coefficients of `model`, to be screened: wider priors, with names by `widened`, and each effect of the
+/// catalogue that `model` lacks and that is not among `others`, with names by `with`.
+///
+/// Effects of which a diagnosis knows no starting values are left out.
+pub fn alternatives(
+    model: &GreyBox,
+    others: &[Added],
+    widened: impl Fn(f64) -> String,
+    with: impl Fn(&str) -> String,
+) -> Vec<Structure> {
+    let effort = Effort::Screened;
+    let wider =
+        |factor| Structure { name: widened(factor), fitted: Fitted::Widened(factor), effort };
+    let new = searched(model, &[]).into_iter().filter(|id| others.iter().all(|o| o.id != *id));
+    let added = new.map(|id| Added { id: id.into(), start: None });
+    let possible = added.filter(|added| joined(&mut model.clone(), added).is_ok());
+    let beside = possible.map(|added| {
+        let per_flight = PerFlight { sensors: SensorErrors::Dropped, ..PerFlight::default() };
+        let name = with(&added.id);
+        let fitted = Fitted::Coefficients { effects: vec![added], per_flight };
+        Structure { name, fitted, effort }
+    });
+    WIDER.into_iter().map(wider).chain(beside).collect()
 }
 
 /// Leaves out each of `flights` in turn and computes the error of each of `structures` of `model` on this flight. Baselines
@@ -94,7 +141,8 @@ pub struct Scored {
 ///
 /// The chosen structure has the fewest free coefficients among all whose mean error exceeds that of the best structure by no
 /// more than one standard error of the difference, flight by flight, or by 1 % (the rule of Breiman et al., Classification and
-/// Regression Trees, 1984, section 3.4.3, with paired differences).
+/// Regression Trees, 1984, section 3.4.3, with paired differences). Structures that were only screened ([`Effort::Screened`]) are not
+/// among them.
 ///
 /// # Errors
 /// If fewer than [`LEAST_FLIGHTS`] flights are long enough for the shortest horizon, if the sampling interval of a flight is
@@ -125,212 +173,58 @@ pub fn leave_one_out(
     }
     let names: Vec<String> = judges.iter().map(|k| flights[*k].name.clone()).collect();
     let set = Set { judged: &ready, fitted: &right, judges: &judges, at };
-    let (mut all, mut failed, mut any_fit) = (Vec::new(), None, false);
-    let mut tuned: Option<Models> = None;
-    for (k, structure) in structures.iter().enumerate() {
-        let doing = format!("{}: leaving out one flight after the other", structure.name);
-        report(progress, &doing, k as f64 / structures.len() as f64)?;
-        let fitted = &structure.fitted;
-        let mut models = match (fitted, &tuned) {
-            (Fitted::Nothing, _) => vec![Some(model.clone()); judges.len()],
-            (Fitted::LinearResidual, Some(tuned)) => tuned.clone(),
-            _ => fit(model, &set, fitted, &mut failed)?,
-        };
-        any_fit |= !matches!(fitted, Fitted::Nothing) && models.iter().any(Option::is_some);
-        if fitted.tunes_only() {
-            tuned = Some(models.clone());
-        }
-        if matches!(fitted, Fitted::LinearResidual) {
-            models = set.with_residuals(&models);
-        }
-        let combined = set.combined(&models);
-        let of = scored(structure, free(model, fitted)?, set.errors(&models));
-        all.push(Scored { models, combined, ..of });
-    }
-    // if no fit succeeded, the model as given would be chosen without a comparison
-    if let Some(why) = failed.filter(|_| !any_fit) {
-        return Err(why);
-    }
+    let mut all = of_structures(&mut Fits::of(model, &set), structures, progress)?;
     choose(&mut all);
     all.extend(black_boxes(model, &set));
     all.iter_mut().for_each(|s| s.flights = names.clone());
     Ok(all)
 }
 
-impl Fitted {
-    /// Whether only the model's coefficients are fitted, or a linear residual after them.
-    fn tunes_only(&self) -> bool {
-        match self {
-            Fitted::LinearResidual => true,
-            Fitted::Coefficients { effects, per_flight } => {
-                effects.is_empty() && unjudged(per_flight) == unjudged(&PerFlight::default())
-            }
-            Fitted::Nothing | Fitted::FromScratch => false,
-        }
-    }
-}
-
-/// For each flight that is left out, the model that was fitted to all other flights; `None` if the fit failed.
-type Models = Vec<Option<GreyBox>>;
-
-/// The flights of a cross-validation.
-struct Set<'a> {
-    /// All flights as reconstructed, for the predictions.
-    judged: &'a [Flight],
-    /// The same flights, corrected for the sensor errors and misaligned axes that the model's file states, for the fits.
-    fitted: &'a [Flight],
-    /// Indices of the flights that are long enough to be predicted. The other flights are only used in fits.
-    judges: &'a [usize],
-    /// Horizon of the errors, s.
-    at: f64,
-}
-
-/// Errors of the baseline forecasts: held state, straight flight, and a linear model fitted to the other flights.
-fn black_boxes(model: &GreyBox, set: &Set) -> Vec<Scored> {
-    let prepared: Vec<Prepared> = set.judged.iter().map(|f| f.prepared.clone()).collect();
-    let names = ["hold the state", "fly straight on", "linear (ARX), fitted to the others"];
-    let mut errors = vec![Vec::new(); names.len()];
-    for &left in set.judges {
-        let others = prepared.iter().enumerate().filter(|(k, _)| *k != left);
-        let others: Vec<Prepared> = others.map(|(_, f)| f.clone()).collect();
-        let one = std::slice::from_ref(&prepared[left]);
-        let results = forecast::on_unseen(&others, one, model.scale(), &[set.at]);
-        for (k, list) in errors.iter_mut().enumerate() {
-            list.push(results.get(k).map_or(f64::NAN, |r| r.free_run[0].rmse_scaled));
-        }
-    }
-    let of = |(name, errors): (&str, Vec<f64>)| {
-        scored(&Structure { name: name.into(), fitted: Fitted::Nothing }, 0, errors)
+/// The errors of all `structures`, in their order. Those to be screened follow after all others.
+fn of_structures(
+    fits: &mut Fits,
+    structures: &[Structure],
+    progress: &Progress,
+) -> Result<Vec<Scored>, AmendError> {
+    let (mut done, count) = (0, structures.len() + FITTED_AFTER_SCREENING);
+    let mut next = |doing: String| {
+        done += 1;
+        report(progress, &doing, (done - 1) as f64 / count as f64)
     };
-    names.into_iter().zip(errors).map(of).collect()
-}
-
-fn scores(
-    model: &GreyBox,
-    test: &[Flight],
-    horizons_s: &[f64],
-) -> Vec<crate::compare::HorizonScore> {
-    Judge { test, horizons_s }.scores(model)
-}
-
-impl Set<'_> {
-    /// Error of each predicted flight with the model that was fitted to all other flights; NaN without a model.
-    fn errors(&self, models: &[Option<GreyBox>]) -> Vec<f64> {
-        let one = |(left, model): (&usize, &Option<GreyBox>)| {
-            let Some(model) = model else { return f64::NAN };
-            let test = std::slice::from_ref(&self.judged[*left]);
-            judged(&scores(model, test, &[self.at])).unwrap_or(f64::NAN)
-        };
-        self.judges.par_iter().zip(models).map(one).collect()
+    let mut all: Vec<Option<Scored>> = vec![None; structures.len()];
+    let (quick, others): (Vec<_>, Vec<_>) =
+        structures.iter().enumerate().partition(|(_, structure)| structure.is_screened());
+    for (k, structure) in others {
+        next(format!("{}: leaving out one flight after the other", structure.name))?;
+        all[k] = Some(fits.complete(structure)?);
     }
-
-    /// `models`, each with its linear residual.
-    fn with_residuals(&self, models: &[Option<GreyBox>]) -> Models {
-        let one = |(left, model): (&usize, &Option<GreyBox>)| {
-            Some(corrected(model.clone()?, self, *left))
-        };
-        self.judges.par_iter().zip(models).map(one).collect()
+    for (k, structure) in quick {
+        next(format!("{}: screened", structure.name))?;
+        all[k] = Some(fits.screened(structure)?);
     }
-
-    /// What `models` reach together with the held and the mean state. `None` if fewer than two flights have a model.
-    fn combined(&self, models: &[Option<GreyBox>]) -> Option<Combined> {
-        let one = |(left, model): (&usize, &Option<GreyBox>)| {
-            let others = self.judged.iter().enumerate().filter(|(k, _)| k != left);
-            let others: Vec<&Prepared> = others.map(|(_, f)| &f.prepared).collect();
-            let mean_state = mean_state(others);
-            let flight = &self.judged[*left].prepared;
-            Some(Forecasts::of_model(
-                model.as_ref()?,
-                flight,
-                &[self.at],
-                EVERY_S,
-                None,
-                mean_state,
-            ))
-        };
-        let parts: Vec<Forecasts> = self.judges.par_iter().zip(models).filter_map(one).collect();
-        let chosen = choose_weights(&parts)?;
-        let weight_of_model = chosen.combination.of_model()[0];
-        Some(Combined { error: chosen.error, weight_of_model })
+    let mut all: Vec<Scored> = all.into_iter().flatten().collect();
+    for k in promising(&all) {
+        next(format!("{}: leaving out one flight after the other", structures[k].name))?;
+        all[k] = fits.complete(&structures[k])?;
+    }
+    // if no fit succeeded, the model as given would be chosen without a comparison
+    match fits.failure() {
+        Some(why) => Err(why),
+        None => Ok(all),
     }
 }
 
-/// Fits the structure `fitted` without each of the predicted flights. The first error of a fit is put in `failed`.
-fn fit(
-    model: &GreyBox,
-    set: &Set,
-    fitted: &Fitted,
-    failed: &mut Option<AmendError>,
-) -> Result<Models, AmendError> {
-    let anew = matches!(fitted, Fitted::Coefficients { per_flight, .. } if per_flight.angles() > 0);
-    let flights = if anew { set.judged } else { set.fitted };
-    let (start, options) = match fitted {
-        Fitted::Nothing | Fitted::LinearResidual => (
-            model.clone(),
-            FitOptions { per_flight: unjudged(&PerFlight::default()), ..FitOptions::default() },
-        ),
-        Fitted::FromScratch => {
-            let per_flight = PerFlight { sensors: SensorErrors::Dropped, ..PerFlight::default() };
-            (parameters::from_scratch(model), FitOptions { per_flight, ..FitOptions::default() })
-        }
-        Fitted::Coefficients { effects, per_flight } => {
-            let added = effects.iter().map(|a| a.id.clone()).collect();
-            let per_flight = unjudged(per_flight);
-            let options = FitOptions { added, per_flight, ..FitOptions::default() };
-            (with(model, effects)?, options)
-        }
-    };
-    let without = match fitted {
-        Fitted::FromScratch => output_error::without_each_anew,
-        _ => output_error::without_each,
-    };
-    let fits = without(&start, flights, &options, set.judges);
-    let mut models = Vec::with_capacity(fits.len());
-    for fit in fits {
-        match fit {
-            Ok(fit) => models.push(Some(fit.model)),
-            Err(why) => {
-                *failed = failed.take().or(Some(why));
-                models.push(None);
-            }
-        }
-    }
-    Ok(models)
-}
-
-/// `per_flight` without common sensor errors, unless they are kept in any case: no other flight is left to judge them.
-fn unjudged(per_flight: &PerFlight) -> PerFlight {
-    let sensors = match per_flight.sensors {
-        SensorErrors::Kept => SensorErrors::Kept,
-        SensorErrors::Judged | SensorErrors::Dropped => SensorErrors::Dropped,
-    };
-    PerFlight { sensors, ..*per_flight }
-}
-
-/// `model` with its linear residual over all flights except the one with the index `left`; `model` if no residual helps.
-fn corrected(model: GreyBox, set: &Set, left: usize) -> GreyBox {
-    let others = set.judged.iter().enumerate().filter(|(k, _)| *k != left);
-    let others: Vec<Prepared> = others.map(|(_, f)| f.prepared.clone()).collect();
-    linear_residual::fit(&model, &others, &[set.at]).map_or(model, |found| found.model)
-}
-
-fn with(model: &GreyBox, effects: &[Added]) -> Result<GreyBox, AmendError> {
-    let mut with = model.clone();
-    effects.iter().try_for_each(|added| joined(&mut with, added))?;
-    Ok(with)
-}
-
-/// Number of free coefficients of a structure, plus the number of constants of one flight.
-fn free(model: &GreyBox, fitted: &Fitted) -> Result<usize, AmendError> {
-    Ok(match fitted {
-        Fitted::Nothing => 0,
-        Fitted::LinearResidual => parameters::free(model, &[]).len() + linear_residual::FREE,
-        Fitted::FromScratch => parameters::free(&parameters::from_scratch(model), &[]).len(),
-        Fitted::Coefficients { effects, per_flight } => {
-            let ids: Vec<&str> = effects.iter().map(|a| a.id.as_str()).collect();
-            parameters::free(&with(model, effects)?, &ids).len() + per_flight.constants().len()
-        }
-    })
+/// Indices of the screened structures that are worth a complete fit: the best ones within one standard error, or 1 %, of the best
+/// complete fit.
+fn promising(all: &[Scored]) -> Vec<usize> {
+    let complete = all.iter().filter(|s| !s.screened);
+    let best = complete.min_by(|a, b| a.mean.total_cmp(&b.mean)).filter(|b| b.mean.is_finite());
+    let Some(best) = best else { return Vec::new() };
+    let within = |k: &usize| all[*k].screened && all[*k].beside(best).0;
+    let mut places: Vec<usize> = (0..all.len()).filter(within).collect();
+    places.sort_by(|a, b| all[*a].mean.total_cmp(&all[*b].mean));
+    places.truncate(FITTED_AFTER_SCREENING);
+    places
 }
 
 fn scored(structure: &Structure, free: usize, errors: Vec<f64>) -> Scored {
@@ -342,6 +236,7 @@ fn scored(structure: &Structure, free: usize, errors: Vec<f64>) -> Scored {
         free,
         flights: Vec::new(),
         errors,
+        screened: false,
         models: Vec::new(),
         mean,
         standard_error,
@@ -359,18 +254,27 @@ pub(super) fn mean_with_error(x: &[f64]) -> [f64; 2] {
     [mean, (variance / n).sqrt()]
 }
 
+impl Scored {
+    /// Whether the mean error exceeds that of `best` by no more than one standard error of the difference, or by 1 %; and this
+    /// standard error.
+    fn beside(&self, best: &Scored) -> (bool, f64) {
+        let more: Vec<f64> = self.errors.iter().zip(&best.errors).map(|(a, b)| a - b).collect();
+        let [difference, error] = mean_with_error(&more);
+        (difference <= error.max(IMPROVED * best.mean), error)
+    }
+}
+
 /// Marks the structure with the fewest free coefficients whose mean error exceeds the best by no more than one standard error
-/// of the difference, or by 1 %.
+/// of the difference, or by 1 %. Structures that were only screened do not take part.
 fn choose(all: &mut [Scored]) {
-    let best = all.iter().min_by(|a, b| a.mean.total_cmp(&b.mean)).cloned();
+    let complete = all.iter().filter(|s| !s.screened);
+    let best = complete.min_by(|a, b| a.mean.total_cmp(&b.mean)).cloned();
     let Some(best) = best.filter(|b| b.mean.is_finite()) else { return };
     let mut simplest: Option<(usize, usize)> = None;
     for (k, s) in all.iter_mut().enumerate() {
-        let more: Vec<f64> = s.errors.iter().zip(&best.errors).map(|(a, b)| a - b).collect();
-        let [difference, error] = mean_with_error(&more);
+        let (within, error) = s.beside(&best);
         s.beside_best = error;
-        let within = difference <= error.max(IMPROVED * best.mean);
-        if within && simplest.is_none_or(|(_, free)| s.free < free) {
+        if within && !s.screened && simplest.is_none_or(|(_, free)| s.free < free) {
             simplest = Some((k, s.free));
         }
     }

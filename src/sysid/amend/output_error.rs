@@ -29,7 +29,7 @@ use crate::progress::{Cancelled, Progress, report};
 use greylag_model::GreyBox;
 use start::Start;
 
-pub(super) use folds::{without_each, without_each_anew};
+pub(super) use folds::{Folds, Near, screened, without_each, without_each_anew};
 
 /// Smallest usable duration of all flights together, s.
 pub const LEAST_S: f64 = 10.0;

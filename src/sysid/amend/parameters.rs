@@ -133,6 +133,12 @@ pub(super) fn from_scratch(model: &GreyBox) -> GreyBox {
     model.clone().with_widths(range)
 }
 
+/// `model` with the prior standard deviations of its free coefficients multiplied by `factor`.
+pub(super) fn widened(model: &GreyBox, factor: f64) -> GreyBox {
+    let wider = |c: &Named| (c.width() > 0.0).then(|| factor * c.width());
+    model.clone().with_widths(wider)
+}
+
 /// Names of the coefficients of `model` that no fit changes, because they are zero and the model file states no standard
 /// deviation.
 pub(super) fn held_at_zero(model: &GreyBox) -> Vec<String> {

@@ -1,30 +1,36 @@
 //! Combination of forecasts: what a model, the state at the start and the mean state predict together.
 //!
-//! The combined forecast of a state at the horizon h is x̂(h) = x₀ + w(h) (x_m(h) − x₀) + c(h) (x̄ − x₀). x₀ is the state at the
-//! start of the run, x_m(h) the model's prediction, and x̄ the mean state of the flights to which the model was fitted. w is the
-//! weight of the model, c that of the mean state, and 1 − w − c that of the held state. The three weights are not negative. A small
-//! w says that the model is not to be trusted over this time.
+//! The combined forecast of a state at the horizon h is x̂(h) = x₀ + w(h) (x_m(h) − x₀) + v(h) (x_2(h) − x₀) + c(h) (x̄ − x₀). x₀ is
+//! the state at the start of the run, x_m(h) the model's prediction, x_2(h) that of a second forecast, if there is one, and x̄ the
+//! mean state of the flights to which the model was fitted. w is the weight of the model, v that of the second forecast, c that of
+//! the mean state, and 1 − w − v − c that of the held state. The weights are not negative. A small w says that the model is not to
+//! be trusted over this time.
 //!
 //! Sources: Bates and Granger, The combination of forecasts, Operational Research Quarterly 20, 1969; weights from predictions of
 //! parts that the model was not fitted to: Wolpert, Stacked generalization, Neural Networks 5, 1992; shrinkage towards equal weights:
 //! Diebold and Pauly, The use of prior information in forecast combination, International Journal of Forecasting 6, 1990.
 
+mod weights;
+
 use super::arx::{Arx, ArxError};
 use super::correction::Correction;
 use super::forecast::{self, Forecast};
-use super::free_run::{self, error};
+use super::free_run::{self, error, scaled};
 use super::result::HorizonScore;
 use super::runs::{Ahead, Runs};
 use crate::weak_form::prepared::Prepared;
 use greylag_model::GreyBox;
 use greylag_num::statistics::mean;
+use weights::{FORECASTS, Sums, equal};
 
 /// Time between the starts of the runs from which weights follow, s. With that between the runs of a comparison there would be few.
 pub const EVERY_S: f64 = 0.5;
 /// Smaller scaled errors are replaced by this value (dimensionless), because they may differ by rounding only.
 const LEAST_ERROR: f64 = 1e-6;
-/// Equal weights of model, mean state and held state.
-const EQUAL: [f64; 2] = [1.0 / 3.0; 2];
+/// A forecast diverges if its error exceeds that of holding the state at the start by this factor.
+const DIVERGED: f64 = 10.0;
+/// Smallest relative decrease of the error for which a more complex forecast is taken.
+const CLEARLY: f64 = 0.01;
 /// Shrinkages that are tried. See [`Choice::runs`].
 const SHRINKAGES: [f64; 4] = [1.0, 10.0, 100.0, 1e6];
 
@@ -34,6 +40,8 @@ const SHRINKAGES: [f64; 4] = [1.0, 10.0, 100.0, 1e6];
 pub struct Forecasts {
     horizons_s: Vec<f64>,
     runs: Vec<Ahead>,
+    /// Runs of a second forecast from the same starts.
+    second: Option<Vec<Ahead>>,
     scale: [f64; 8],
     mean_state: [f64; 8],
 }
@@ -61,8 +69,8 @@ pub struct Choice {
 /// Weights of the forecasts that are combined.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Combination {
-    /// For each horizon and state the weights of model and mean state, 0 to 1, dimensionless.
-    pub weights: Vec<[[f64; 2]; 8]>,
+    /// For each horizon and state the weights of the model, of the second forecast and of the mean state, 0 to 1, dimensionless.
+    pub weights: Vec<[[f64; FORECASTS]; 8]>,
 }
 
 /// A combination that was chosen by cross-validation.
@@ -90,7 +98,8 @@ impl Forecasts {
         mean_state: [f64; 8],
     ) -> Forecasts {
         let runs = free_run::ahead(model, flight, horizons_s, every_s, correction);
-        Forecasts { horizons_s: horizons_s.to_vec(), runs, scale: model.scale(), mean_state }
+        let (scale, second) = (model.scale(), None);
+        Forecasts { horizons_s: horizons_s.to_vec(), runs, second, scale, mean_state }
     }
 
     /// Runs of an ARX forecast, as [`Forecasts::of_model`]. `scale` divides distances and has the units of the state.
@@ -107,16 +116,42 @@ impl Forecasts {
         arx.sampled_as(flight)?;
         let forecast = Forecast::Linear(arx.clone());
         let runs = forecast::ahead(&forecast, flight, scale, horizons_s, every_s);
-        Ok(Forecasts { horizons_s: horizons_s.to_vec(), runs, scale, mean_state })
+        Ok(Forecasts { horizons_s: horizons_s.to_vec(), runs, second: None, scale, mean_state })
     }
 
     /// The same runs of a forecast that holds the state at the start.
     pub fn held(&self) -> Forecasts {
-        let mut held = self.clone();
+        let mut held = Forecasts { second: None, ..self.clone() };
         for run in &mut held.runs {
             run.pairs.iter_mut().for_each(|pair| pair[1] = run.from);
+            let errors = run.pairs.iter().map(|[measured, _]| error(measured, &run.from));
+            run.unheld = errors.map(|error| scaled(&error, &self.scale)).collect();
         }
         held
+    }
+
+    /// These runs together with those of `second`, another forecast of the same flight to the same horizons. `None` if the runs do
+    /// not correspond.
+    pub fn beside(self, second: &Forecasts) -> Option<Forecasts> {
+        let lengths = |runs: &[Ahead]| runs.iter().map(|run| run.pairs.len()).collect::<Vec<_>>();
+        let same = lengths(&self.runs) == lengths(&second.runs);
+        same.then(|| Forecasts { second: Some(second.runs.clone()), ..self })
+    }
+
+    /// Whether a forecast diverges along this flight: at a horizon, the root mean square of its errors, without the hold of runs
+    /// that end early, is not finite or more than ten times that of holding the state at the start.
+    pub fn diverges(&self) -> bool {
+        let square = |x: f64| x * x;
+        let beyond = |runs: &[Ahead], h: usize| {
+            let (mut own, mut hold) = (0.0, 0.0);
+            for run in runs.iter().filter(|run| run.pairs.len() > h) {
+                own += square(run.unheld[h]);
+                hold += square(scaled(&error(&run.pairs[h][0], &run.from), &self.scale));
+            }
+            !own.is_finite() || own > square(DIVERGED) * hold
+        };
+        let mut all = [Some(&self.runs), self.second.as_ref()].into_iter().flatten();
+        all.any(|runs| (0..self.horizons_s.len()).any(|h| beyond(runs, h)))
     }
 }
 
@@ -146,25 +181,31 @@ impl Pooled {
 }
 
 impl Combination {
-    /// Equal weights at `horizons` horizons (number).
+    /// Equal weights of model, mean state and held state at `horizons` horizons (number).
     pub fn equal(horizons: usize) -> Combination {
-        Combination { weights: vec![[EQUAL; 8]; horizons] }
+        Combination { weights: vec![[equal(&[]); 8]; horizons] }
+    }
+
+    /// The whole weight on the model at `horizons` horizons (number).
+    fn whole(horizons: usize) -> Combination {
+        Combination { weights: vec![[[1.0, 0.0, 0.0]; 8]; horizons] }
     }
 
     /// The weights with the smallest sum of squared scaled errors over the runs of `parts`, plus the shrinkage. A horizon that no
     /// run reaches has those of the horizon before it, or equal weights.
     pub fn fit(parts: &[&Forecasts], choice: Choice) -> Combination {
         let horizons = parts.first().map_or(0, |p| p.horizons_s.len());
-        let mut weights: Vec<[[f64; 2]; 8]> = Vec::with_capacity(horizons);
+        let equal = equal(parts);
+        let mut weights: Vec<[[f64; FORECASTS]; 8]> = Vec::with_capacity(horizons);
         for h in 0..horizons {
             let runs = parts.iter().map(|p| p.runs.iter().filter(|r| r.pairs.len() > h).count());
             if runs.sum::<usize>() == 0 {
-                weights.push(weights.last().copied().unwrap_or([EQUAL; 8]));
+                weights.push(weights.last().copied().unwrap_or([equal; 8]));
                 continue;
             }
-            let mut at = [EQUAL; 8];
+            let mut at = [equal; 8];
             for group in choice.pooled.groups() {
-                let found = Sums::of(parts, h, group).weights(choice.runs);
+                let found = Sums::of(parts, h, group).weights(choice.runs, &equal);
                 group.iter().for_each(|k| at[*k] = found);
             }
             weights.push(at);
@@ -174,34 +215,79 @@ impl Combination {
 
     /// Errors of the combined forecast on the flight of `forecasts`, one for each horizon.
     pub fn scores(&self, forecasts: &Forecasts) -> Vec<HorizonScore> {
-        let Forecasts { horizons_s, runs, scale, mean_state } = forecasts;
-        let one = |run: &Ahead| {
-            let pairs = run.pairs.iter().zip(&self.weights);
-            let of = |(&[measured, predicted], weights): (&[[f64; 8]; 2], &[[f64; 2]; 8])| {
-                Some([measured, combined(&run.from, &predicted, mean_state, weights)])
+        let Forecasts { horizons_s, runs, scale, .. } = forecasts;
+        let one = |(number, run): (usize, &Ahead)| {
+            let of = |(h, weights): (usize, &[[f64; FORECASTS]; 8])| {
+                let measured = run.pairs.get(h)?[0];
+                let away = forecasts.departures(number, h);
+                let combined = |k: usize| {
+                    run.from[k] + (0..FORECASTS).map(|f| weights[k][f] * away[f][k]).sum::<f64>()
+                };
+                Some([measured, std::array::from_fn(combined)])
             };
-            pairs.map(of).collect()
+            let reached = self.weights.iter().enumerate().take(run.pairs.len());
+            reached.map(of).collect()
         };
-        let runs = Runs::new(horizons_s.clone(), runs.iter().map(one).collect(), *scale);
+        let runs = runs.iter().enumerate().map(one).collect();
+        let runs = Runs::new(horizons_s.clone(), runs, *scale);
         horizons_s.iter().map(|h| runs.score(*h)).collect()
     }
 
     /// Mean over the states of the model's weight at each horizon, 0 to 1.
     pub fn of_model(&self) -> Vec<f64> {
-        let one = |at: &[[f64; 2]; 8]| at.iter().map(|w| w[0]).sum::<f64>() / 8.0;
+        let one = |at: &[[f64; FORECASTS]; 8]| at.iter().map(|w| w[0]).sum::<f64>() / 8.0;
         self.weights.iter().map(one).collect()
     }
 }
 
-/// The combined forecast of a run from the state `from` whose model predicts `predicted`.
-fn combined(
-    from: &[f64; 8],
-    predicted: &[f64; 8],
-    mean_state: &[f64; 8],
-    weights: &[[f64; 2]; 8],
-) -> [f64; 8] {
-    let [model, mean] = [predicted, mean_state].map(|to| error(from, to));
-    std::array::from_fn(|k| from[k] + weights[k][0] * model[k] + weights[k][1] * mean[k])
+impl Forecasts {
+    /// Departures from the start of run `number` at horizon number `h` that the model, the second forecast and the mean state predict, in
+    /// the units of the state. That of a second forecast which does not exist is zero.
+    fn departures(&self, number: usize, h: usize) -> [[f64; 8]; FORECASTS] {
+        let run = &self.runs[number];
+        let second = self.second.as_ref().map_or(&run.from, |all| &all[number].pairs[h][1]);
+        [&run.pairs[h][1], second, &self.mean_state].map(|to| error(&run.from, to))
+    }
+}
+
+/// Those of `parts` that reach the shortest horizon; `None` if they are fewer than two.
+fn reached(parts: &[Forecasts]) -> Option<Vec<&Forecasts>> {
+    let reached = parts.iter().filter(|p| p.runs.iter().any(|run| !run.pairs.is_empty()));
+    let reached: Vec<&Forecasts> = reached.collect();
+    (reached.len() >= 2).then_some(reached)
+}
+
+/// Scaled error of the model alone on `parts`, as [`Chosen::error`]. `None` if fewer than two parts reach the shortest horizon, or if
+/// it diverges along one.
+pub fn error_alone(parts: &[Forecasts]) -> Option<f64> {
+    if parts.iter().any(Forecasts::diverges) {
+        return None;
+    }
+    reached(parts).map(|parts| alone(&parts))
+}
+
+/// Scaled error of the model alone on `parts`, of which there is at least one.
+fn alone(parts: &[&Forecasts]) -> f64 {
+    let alone = Combination::whole(parts[0].horizons_s.len());
+    overall(parts.iter().map(|part| alone.scores(part)))
+}
+
+/// Chooses among `candidates`, ways to forecast the same parts in ascending order of complexity. A way is taken in place of a simpler
+/// one if it lowers [`Chosen::error`] by more than 1 %. A way that diverges along a part is left out. Returns the index of the way with
+/// its combination; `None` if there is none.
+pub fn simplest(candidates: &[Vec<Forecasts>]) -> Option<(usize, Chosen)> {
+    let mut taken: Option<(usize, Chosen)> = None;
+    for (place, parts) in candidates.iter().enumerate() {
+        if parts.iter().any(Forecasts::diverges) {
+            continue;
+        }
+        let Some(chosen) = choose(parts) else { continue };
+        let least = taken.as_ref().map_or(f64::INFINITY, |(_, simpler)| simpler.error);
+        if chosen.error < (1.0 - CLEARLY) * least {
+            taken = Some((place, chosen));
+        }
+    }
+    taken
 }
 
 /// Chooses which states are pooled and the shrinkage: each of `parts` is predicted with weights from the others. The error is that
@@ -209,13 +295,8 @@ fn combined(
 ///
 /// The forecasts of a part must come from a model that was not fitted to it.
 pub fn choose(parts: &[Forecasts]) -> Option<Chosen> {
-    let reached: Vec<&Forecasts> =
-        parts.iter().filter(|p| p.runs.iter().any(|r| !r.pairs.is_empty())).collect();
-    if reached.len() < 2 {
-        return None;
-    }
-    let alone = Combination { weights: vec![[[1.0, 0.0]; 8]; reached[0].horizons_s.len()] };
-    let alone = overall(reached.iter().map(|part| alone.scores(part)));
+    let reached = reached(parts)?;
+    let alone = alone(&reached);
     let left_out = |choice: Choice| {
         overall((0..reached.len()).map(|left| {
             let mut others = reached.clone();
@@ -241,58 +322,6 @@ fn overall(scores: impl Iterator<Item = Vec<HorizonScore>>) -> f64 {
         (!errors.is_empty()).then(|| mean(&errors).max(LEAST_ERROR).ln())
     };
     mean(&(0..horizons).filter_map(logarithm).collect::<Vec<_>>()).exp()
-}
-
-/// Sums over runs and states from which two weights follow. Departures from the start are divided by the scale.
-struct Sums {
-    /// Sums of the products of two predicted departures: of the model twice, of model and mean state, of the mean state twice.
-    gram: [f64; 3],
-    /// Sums of the products of a predicted departure and the measured one.
-    moments: [f64; 2],
-    /// Number of runs.
-    runs: f64,
-}
-
-impl Sums {
-    /// Sums over the runs of `parts` that reach horizon number `h`, and over the states `group`.
-    fn of(parts: &[&Forecasts], h: usize, group: &[usize]) -> Sums {
-        let mut sums = Sums { gram: [0.0; 3], moments: [0.0; 2], runs: 0.0 };
-        for part in parts {
-            for run in &part.runs {
-                let Some([measured, predicted]) = run.pairs.get(h) else { continue };
-                let [measured, model, mean] =
-                    [measured, predicted, &part.mean_state].map(|to| error(&run.from, to));
-                for &k in group {
-                    let [y, m, c] = [measured, model, mean].map(|d| d[k] / part.scale[k]);
-                    sums.gram.iter_mut().zip([m * m, m * c, c * c]).for_each(|(s, x)| *s += x);
-                    sums.moments.iter_mut().zip([m * y, c * y]).for_each(|(s, x)| *s += x);
-                }
-                sums.runs += 1.0;
-            }
-        }
-        sums
-    }
-
-    /// The weights, shrunk by `shrinkage` runs towards equal weights.
-    fn weights(&self, shrinkage: f64) -> [f64; 2] {
-        let share = shrinkage / self.runs.max(1.0);
-        let [mut a, b, mut d] = self.gram;
-        let [more_a, more_d] = [a, d].map(|x| share * x);
-        let [e, f] = [self.moments[0] + more_a * EQUAL[0], self.moments[1] + more_d * EQUAL[1]];
-        (a, d) = (a + more_a, d + more_d);
-        let cost =
-            |[w, c]: [f64; 2]| a * w * w + 2.0 * b * w * c + d * c * c - 2.0 * (e * w + f * c);
-        let determinant = a * d - b * b;
-        let inside = [(d * e - b * f) / determinant, (a * f - b * e) / determinant];
-        if inside.iter().all(|x| *x >= 0.0) && inside[0] + inside[1] <= 1.0 {
-            return inside;
-        }
-        // otherwise the minimum is on an edge of the triangle of permitted weights
-        let held = |x: f64| if x.is_finite() { x.clamp(0.0, 1.0) } else { EQUAL[0] };
-        let along = held((d - b + e - f) / (a - 2.0 * b + d));
-        let edges = [[held(e / a), 0.0], [0.0, held(f / d)], [along, 1.0 - along]];
-        edges.into_iter().min_by(|x, y| cost(*x).total_cmp(&cost(*y))).unwrap_or(EQUAL)
-    }
 }
 
 #[cfg(test)]

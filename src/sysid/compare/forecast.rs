@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::answer::ANSWER_S;
 use super::arx::{self, Arx};
-use super::free_run::{End, START_EVERY_S};
+use super::free_run::{End, START_EVERY_S, error, scaled};
 use super::result::HorizonScore;
 use super::runs::{Ahead, Look, Runs};
 use crate::flight_path::reconstruction::{Instant, Reconstruction};
@@ -64,7 +64,7 @@ impl Forecast {
 
     /// Makes one run from sample `start` of `segment`. Returns the measured and the predicted state after each number of steps in
     /// `looks` that the segment reaches; `None` once the run has diverged. It ends early as `end` says, with the distances divided
-    /// by `scale`.
+    /// by `scale`. Returns also the scaled errors of the run without a hold.
     pub(super) fn run(
         &self,
         segment: &[Instant],
@@ -72,26 +72,29 @@ impl Forecast {
         start: usize,
         looks: &[usize],
         (scale, end): (&[f64; 8], End),
-    ) -> Vec<Look> {
+    ) -> (Vec<Look>, Vec<f64>) {
         let mut past = arx::past(segment, start, self.order());
         let from = past[0];
-        let (mut seen, mut lost) = (Vec::new(), false);
+        let (mut seen, mut unheld, mut held) = (Vec::new(), Vec::new(), None);
         let reached = looks.iter().filter(|l| start + **l < segment.len());
         let mut at = start;
         for look in reached {
-            while at < start + look && !lost {
+            while at < start + look && (held.is_none() || end == End::Far) {
                 let next = self.next(&past, &segment[..=at], dt);
                 at += 1;
-                lost = !end.goes_on(&from, &segment[at].state.to_array(), &next, scale);
-                if !lost {
-                    past.rotate_right(1);
-                    past[0] = next;
+                let measured = segment[at].state.to_array();
+                if held.is_none() && !end.goes_on(&from, &measured, &next, scale) {
+                    held = Some(past[0]);
                 }
+                past.rotate_right(1);
+                past[0] = next;
             }
-            let pair = [segment[start + look].state.to_array(), past[0]];
-            seen.push((!lost || end == End::Far).then_some(pair));
+            let measured = segment[start + look].state.to_array();
+            let pair = [measured, held.unwrap_or(past[0])];
+            seen.push((held.is_none() || end == End::Far).then_some(pair));
+            unheld.push(scaled(&error(&measured, &past[0]), scale));
         }
-        seen
+        (seen, unheld)
     }
 }
 
@@ -181,7 +184,7 @@ fn flown(
     horizons: &[f64],
 ) -> Vec<Vec<Look>> {
     let all = starts_and_runs(forecast, flight, horizons, START_EVERY_S, (&scale, End::Wrong));
-    all.into_iter().map(|(_, looks)| looks).collect()
+    all.into_iter().map(|(_, (looks, _))| looks).collect()
 }
 
 /// The runs of `forecast` along one flight from starts every `every_s` (s) to each of `horizons_s` (s) that is recorded. They end
@@ -194,12 +197,16 @@ pub(super) fn ahead(
     every_s: f64,
 ) -> Vec<Ahead> {
     let all = starts_and_runs(forecast, flight, horizons_s, every_s, (&scale, End::Far));
-    let one = |(from, looks): ([f64; 8], Vec<Look>)| Ahead {
+    let one = |(from, (looks, unheld)): FromAndLooks| Ahead {
         from,
         pairs: looks.into_iter().flatten().collect(),
+        unheld,
     };
     all.into_iter().map(one).collect()
 }
+
+/// The first state of a run, its looks, and its scaled errors without a hold.
+type FromAndLooks = ([f64; 8], (Vec<Look>, Vec<f64>));
 
 /// The first state and the looks of each run of `forecast` along one flight, from starts every `every_s` (s). The last argument has
 /// the scale of the states and says where a run ends early.
@@ -209,7 +216,7 @@ fn starts_and_runs(
     horizons_s: &[f64],
     every_s: f64,
     ends: (&[f64; 8], End),
-) -> Vec<([f64; 8], Vec<Look>)> {
+) -> Vec<FromAndLooks> {
     let steps = |time_s: f64| ((time_s / flight.dt).round() as usize).max(1);
     let looks: Vec<usize> = horizons_s.iter().map(|h| steps(*h)).collect();
     let of = |segment: &Vec<Instant>| {

@@ -108,7 +108,7 @@ fn fly_one(
         let from = trace[0].len();
         let starts: Vec<usize> = (0..segment.len() - 1).step_by(every).collect();
         for starts in starts.chunks(RUNS_AT_A_TIME) {
-            let flown: Vec<(Vec<Look>, Vec<[f64; 8]>)> = starts
+            let flown: Vec<Flown> = starts
                 .par_iter()
                 .map(|&start| {
                     let acting = correction.map(|c| c.from(&model, flight, segment, start));
@@ -116,7 +116,7 @@ fn fly_one(
                     run(&model, flight, segment, start, wanted, acting)
                 })
                 .collect();
-            for (start, (looks, path)) in starts.iter().zip(flown) {
+            for (start, Flown { looks, path, .. }) in starts.iter().zip(flown) {
                 for (k, list) in trace.iter_mut().enumerate() {
                     list.resize(from + start, f64::NAN);
                     list.extend(path.iter().map(|state| state[k]));
@@ -152,9 +152,9 @@ pub(super) fn ahead(
     let from = |segment: &[Instant], start: usize| {
         let acting = correction.map(|c| c.from(model, flight, segment, start));
         let wanted = Wanted { looks: &looks, keep: 1, end: End::Far };
-        let (seen, _) = run(model, flight, segment, start, wanted, acting);
-        let pairs = seen.into_iter().flatten().map(|pair| pair.map(measured)).collect();
-        Ahead { from: measured(segment[start].state.to_array()), pairs }
+        let Flown { looks, unheld, .. } = run(model, flight, segment, start, wanted, acting);
+        let pairs = looks.into_iter().flatten().map(|pair| pair.map(measured)).collect();
+        Ahead { from: measured(segment[start].state.to_array()), pairs, unheld }
     };
     let of = |segment: &Vec<Instant>| {
         let starts: Vec<usize> = (0..segment.len() - 1).step_by(steps(every_s)).collect();
@@ -190,9 +190,9 @@ pub fn from_moment(model: &GreyBox, flight: &Prepared, time_s: f64, seconds: f64
     let start = segment.partition_point(|i| i.time_s < time_s - 0.5 * flight.dt);
     let keep = ((seconds / flight.dt).round() as usize).max(1) + 1;
     let wanted = Wanted { looks: &[], keep, end: End::Wrong };
-    let (_, rows) = run(&flight.stepping(model), flight, segment, start, wanted, None);
+    let flown = run(&flight.stepping(model), flight, segment, start, wanted, None);
     let mut path = Path::default();
-    for (instant, row) in segment[start..].iter().zip(rows) {
+    for (instant, row) in segment[start..].iter().zip(flown.path) {
         path.time_s.push(instant.time_s);
         path.states.iter_mut().zip(row).for_each(|(list, x)| list.push(x));
     }
@@ -217,7 +217,8 @@ struct Wanted<'a> {
 pub(super) enum End {
     /// Where it is far from the measurements: it has diverged.
     Wrong,
-    /// Where it is far from its start, which is known without a measurement. The last state before that is then held.
+    /// Where it is far from its start, which is known without a measurement. The last state before that is then held. The run is
+    /// continued beside it, to see whether it diverges.
     Far,
 }
 
@@ -238,8 +239,21 @@ impl End {
     }
 }
 
-/// Integrates one run from sample `start`. Returns what is [`Wanted`]: the pairs of measured and predicted state, and the
-/// predicted states.
+/// Scaled distance from the start beyond which a run is not continued: its error counts as infinite.
+const LOST: f64 = 10.0;
+
+/// A run as flown.
+#[derive(Clone, Debug, Default)]
+struct Flown {
+    /// Measured and predicted state at each of [`Wanted::looks`].
+    looks: Vec<Look>,
+    /// The predicted states of the first [`Wanted::keep`] samples.
+    path: Vec<[f64; 8]>,
+    /// Scaled error at each look without the hold of [`End::Far`]; infinite once the run is further than [`LOST`] from its start.
+    unheld: Vec<f64>,
+}
+
+/// Integrates one run from sample `start`. Returns what is [`Wanted`].
 fn run(
     model: &GreyBox,
     flight: &Prepared,
@@ -247,7 +261,7 @@ fn run(
     start: usize,
     Wanted { looks, keep, end }: Wanted,
     mut correction: Option<Acting>,
-) -> (Vec<Look>, Vec<[f64; 8]>) {
+) -> Flown {
     let scale = model.scale();
     let mut memory = Memory::default();
     let advance = |k: usize, state: State, memory: &mut Memory| {
@@ -260,8 +274,9 @@ fn run(
     }
     let last = looks.last().map_or(0, |l| (start + l).min(segment.len() - 1));
     let mut state = segment[start].state;
-    let mut seen = Vec::new();
-    let mut path = vec![state.to_array()];
+    let from = state.to_array();
+    let mut flown = Flown { path: vec![from], ..Flown::default() };
+    let mut held = None;
     for i in start..last.max((start + keep).min(segment.len()) - 1) {
         let before = state.to_array();
         state = advance(i, state, &mut memory);
@@ -271,20 +286,33 @@ fn run(
             state = State::from_array(next);
         }
         let (measured, next) = (segment[i + 1].state.to_array(), state.to_array());
-        if !end.goes_on(&path[0], &measured, &next, &scale) {
-            let rest = looks.iter().filter(|l| start + *l < segment.len()).skip(seen.len());
-            let held = |l: &usize| [segment[start + l].state.to_array(), before];
-            seen.extend(rest.map(|l| (end == End::Far).then(|| held(l))));
+        if held.is_none() && !end.goes_on(&from, &measured, &next, &scale) {
+            held = Some(before);
+        }
+        if let Some(held) = held
+            && (end == End::Wrong || is_lost(&from, &next, &scale))
+        {
+            let rest = looks.iter().filter(|l| start + *l < segment.len()).skip(flown.looks.len());
+            let held = |l: &usize| [segment[start + l].state.to_array(), held];
+            flown.looks.extend(rest.map(|l| (end == End::Far).then(|| held(l))));
+            flown.unheld.resize(flown.looks.len(), f64::INFINITY);
             break;
         }
-        if path.len() < keep {
-            path.push(next);
+        if flown.path.len() < keep {
+            flown.path.push(next);
         }
         for _ in looks.iter().filter(|l| **l == i + 1 - start) {
-            seen.push(Some([measured, next]));
+            flown.looks.push(Some([measured, held.unwrap_or(next)]));
+            flown.unheld.push(scaled(&error(&measured, &next), &scale));
         }
     }
-    (seen, path)
+    flown
+}
+
+/// Whether the state `next` of a run from the state `from` is not finite or further than [`LOST`] from it.
+fn is_lost(from: &[f64; 8], next: &[f64; 8], scale: &[f64; 8]) -> bool {
+    let away = scaled(&error(from, next), scale);
+    away.is_nan() || away > LOST
 }
 
 /// Predicted − measured states, in the units of `State::NAMES`, with the roll error wrapped to ±π. Residuals in the report

@@ -15,6 +15,9 @@ pub(super) struct Ahead {
     pub(super) from: [f64; 8],
     /// Measured and predicted state at each horizon that the flight reaches.
     pub(super) pairs: Vec<[[f64; 8]; 2]>,
+    /// Scaled error (dimensionless) at the same horizons of the run without the hold that [`End::Far`](super::free_run::End::Far)
+    /// describes. Infinite or NaN where the run has left all bounds.
+    pub(super) unheld: Vec<f64>,
 }
 
 /// All free runs of a model over all flights.

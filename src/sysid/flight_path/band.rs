@@ -317,7 +317,12 @@ impl<const N: usize, const W: usize> Stretch<N, W> {
             || Towards::Later.solve(&self.head, before, equations, by, middle),
             || Towards::Earlier.solve(&self.tail, after, equations, by, middle),
         );
-        let all: Vec<_> = head?.into_iter().rev().chain([middle]).chain(tail?).collect();
+        // a third list of this length would take much memory in a long flight
+        let (mut all, tail) = (head?, tail?);
+        all.reverse();
+        all.reserve_exact(1 + tail.len());
+        all.push(middle);
+        all.extend(tail);
         (all.len() == count).then_some(all)
     }
 }

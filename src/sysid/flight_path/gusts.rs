@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::flight_path::equations::{Found, Problem};
+use crate::flight_path::levels::Levels;
 use crate::flight_path::measurement::{OTHERS, Others, by_gust};
 use crate::flight_path::nuisance::{COUNT, Values};
 use crate::flight_path::path::Path;
@@ -23,7 +24,7 @@ const SETS: u64 = 4;
 /// Standard deviations of the constants in `found`, which is a fit that assumes no gusts. The data have the noise levels of
 /// `rough`: gusts, and white noise of the air-data sensors. Residuals beyond `bound` standard deviations are down-weighted, as
 /// in the fit. `None` if the equations are singular.
-pub fn deviations(problem: &Problem, found: &Found, rough: &Found, bound: f64) -> Option<Values> {
+pub fn deviations(problem: &Problem, found: &Found, rough: &Levels, bound: f64) -> Option<Values> {
     let (mut assumed, mut drawn) = ([0.0; COUNT], [0.0; COUNT]);
     for set in 0..SETS {
         let mut random = stream(set, &[]);
@@ -53,26 +54,26 @@ fn draws(
     problem: &Problem,
     path: &Path,
     found: &Found,
-    rough: &Found,
+    rough: &Levels,
     random: &mut Stream,
 ) -> Vec<[Others; 3]> {
     let mut draw = || -> f64 { StandardNormal.sample(random) };
     let step = problem.log.step;
-    let (level, kept) = (rough.levels.gusts, rough.levels.gust_kept(step));
-    let fresh = rough.levels.gust_step(step);
+    let (level, kept) = (rough.gusts, rough.gust_kept(step));
+    let fresh = rough.gust_step(step);
     let mut gusts: [Vector3<f64>; PAIRS] =
         std::array::from_fn(|_| Vector3::from_fn(|_, _| level * draw()));
-    let (l, white) = (&found.levels, &rough.levels.measured);
+    let (l, white) = (&found.levels, &rough.measured);
     (0..path.len())
         .map(|k| {
             let by_gust = by_gust(path, k, &found.values).unwrap_or(Matrix3::zeros());
-            let mut rows = [[0.0; OTHERS]; 3];
+            let mut rows = [[0.0_f32; OTHERS]; 3];
             for (pair, gust) in gusts.iter_mut().enumerate() {
                 let felt = by_gust * *gust;
                 for i in 0..3 {
                     let unit = draw();
-                    rows[i][pair] = unit * l.measured[3 + i] * l.colour[3 + i];
-                    rows[i][PAIRS + pair] = unit * white[3 + i] + felt[i];
+                    rows[i][pair] = (unit * l.measured[3 + i] * l.colour[3 + i]) as f32;
+                    rows[i][PAIRS + pair] = (unit * white[3 + i] + felt[i]) as f32;
                 }
                 *gust = *gust * kept + Vector3::from_fn(|_, _| fresh * draw());
             }

@@ -22,8 +22,9 @@ use crate::flight_path::rotation::{cross, euler_by_turn, to_euler};
 pub const AT: usize = INERTIAL + 1;
 /// Number of additional right-hand sides for which the equations are solved at once.
 pub const OTHERS: usize = 16;
-/// Residuals of a channel, one for each additional right-hand side.
-pub type Others = [f64; OTHERS];
+/// Residuals of a channel, one for each additional right-hand side. They are simulated noise, in single precision because those of a
+/// long flight would be the largest list in memory.
+pub type Others = [f32; OTHERS];
 
 /// Measurements of an instant less their predictions.
 #[derive(Clone, Copy, Debug)]
@@ -223,7 +224,7 @@ pub fn add<const N: usize, const W: usize, const M: usize>(
         rests[channel][M - 1] = residual * weight;
         if let (3..6, Some(others)) = (channel, others) {
             let columns = rests[channel].iter_mut().zip(&others[channel - 3]);
-            columns.for_each(|(x, other)| *x = other * weight);
+            columns.for_each(|(x, other)| *x = f64::from(*other) * weight);
         }
     }
     add_gram(&mut node.own, &nodes, &nodes);

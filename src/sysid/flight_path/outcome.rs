@@ -149,8 +149,6 @@ fn left_as_recorded(skew: &Skew) -> String {
 /// actuator delays that are estimated from each copy. The returned errors of the body rates are the noise levels of the gyros.
 fn draws(problem: &Problem, found: &Found) -> Result<([f64; 8], Vec<ByAxis>), ReconstructError> {
     let singular = || no_path(&problem.options.name, "the equations became singular");
-    let all = |path: &Path| (0..path.len()).map(|k| drawn(path, k)).collect::<Vec<_>>();
-    let own: Vec<Vec<[f64; DRAWN.len()]>> = found.paths.iter().map(all).collect();
     let mut random = stream(0, &[]);
     let (mut squares, mut count, mut delays) = ([0.0; 8], 0.0_f64, Vec::new());
     for _ in 0..DRAWS {
@@ -158,9 +156,14 @@ fn draws(problem: &Problem, found: &Found) -> Result<([f64; 8], Vec<ByAxis>), Re
         let erring = problem.erring(found, &mut random).ok_or_else(singular)?;
         let copy = path_as_segments(problem, found, &erring.paths, Some(&erring.gyro));
         drop(erring);
-        let pairs = own.iter().zip(&copy);
-        for (a, b) in pairs.flat_map(|(a, b)| a.iter().zip(&b.instants)) {
-            let b = b.state.to_array();
+        let pairs = found.paths.iter().zip(&copy);
+        let samples = pairs.flat_map(|(own, copy)| {
+            copy.instants
+                .iter()
+                .enumerate()
+                .map(move |(k, at)| (drawn(own, k), at.state.to_array()))
+        });
+        for (a, b) in samples {
             for (a, i) in a.iter().zip(DRAWN) {
                 let error = if i == 0 { wrap(b[i] - a) } else { b[i] - a };
                 squares[i] += error * error;

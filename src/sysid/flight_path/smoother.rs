@@ -47,8 +47,27 @@ const LEAST_PART: f64 = 1.0 / 64.0;
 /// # Errors
 /// [`ReconstructError::NoPath`] if the search has no finite result.
 pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
-    let Problem { log, options, means, widths, .. } = *problem;
-    let singular = || no_path(&options.name, "the equations became singular");
+    let singular = || no_path(&problem.options.name, "the equations became singular");
+    let mut found = first(problem)?;
+    let mut freed = *problem;
+    free(&mut freed, &mut found, &[])?;
+    match rough(&freed, &mut found, &singular)? {
+        Some(levels) if levels.gusts > STRONG => {
+            // the first fit is made again: a copy of it would take memory in all flights, also in those without strong gusts
+            drop(found);
+            in_gusts(problem, &first(problem)?)
+        }
+        Some(levels) => {
+            gusty(&freed, &mut found, levels, &singular)?;
+            Ok(found)
+        }
+        None => Ok(found),
+    }
+}
+
+/// The fit of motion and constants without gusts and without rare errors of the sensors.
+fn first(problem: &Problem) -> Result<Found, ReconstructError> {
+    let Problem { log, means, widths, .. } = *problem;
     let mut found = Found {
         paths: log.tracks.iter().map(Path::guess).collect(),
         values: means,
@@ -58,15 +77,6 @@ pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
     };
     start(&mut found, problem);
     calm(problem, &mut found, 0)?;
-    let before = found.clone();
-    let mut freed = *problem;
-    free(&mut freed, &mut found, &[])?;
-    let rough = rough(&freed, &found, &singular)?;
-    match rough {
-        Some(trial) if trial.levels.gusts > STRONG => return in_gusts(problem, &before),
-        Some(trial) => gusty(&freed, &mut found, trial, &singular)?,
-        None => (),
-    }
     Ok(found)
 }
 
@@ -81,9 +91,9 @@ fn in_gusts(problem: &Problem, before: &Found) -> Result<Found, ReconstructError
         LATE.iter().for_each(|place| freed.widths[*place] *= nuisance::HELD);
         calm(&freed, &mut found, FIRST)?;
         free(&mut freed, &mut found, &held)?;
-        if let Some(trial) = rough(&freed, &found, &singular)? {
-            let trial = correlated(&freed, trial).ok_or_else(singular)?;
-            gusty(&freed, &mut found, trial, &singular)?;
+        if let Some(levels) = rough(&freed, &mut found, &singular)? {
+            let levels = correlated(&freed, &mut found, levels).ok_or_else(singular)?;
+            gusty(&freed, &mut found, levels, &singular)?;
         }
         for place in LATE {
             found.widths[place] = problem.widths[place];
@@ -108,29 +118,38 @@ fn free(problem: &mut Problem, found: &mut Found, held: &[usize]) -> Result<(), 
     Ok(())
 }
 
-/// `trial`, which has strong gusts, with their most likely correlation time and level, beside white noise of the vanes.
+/// `levels` of strong gusts with their most likely correlation time and level, beside white noise of the vanes. `found` is not changed.
 ///
 /// The gust's change from one sample to the next is well known, its correlation time is not. The default [`GUST_TIME`] overstates the
 /// error of mean wind and biases where gusts are quick.
-fn correlated(problem: &Problem, mut trial: Found) -> Option<Found> {
-    let step = problem.log.step;
-    trial.levels = trial.levels.beside_gusts(problem.log);
-    trial.levels.gusts = likeliest_gusts(problem, &trial)?;
-    let (change, mut least) = (trial.levels.gust_step(step), f64::INFINITY);
-    let mut best = trial.levels;
-    for gust_time in TIMES {
-        let mut levels = best;
-        (levels.gust_time, levels.gusts) = (gust_time, 1.0);
-        levels.gusts = change / levels.gust_step(step);
-        trial.levels = levels;
-        let now = problem.misfit(&trial, f64::INFINITY)?;
-        if now > least {
-            break;
+fn correlated(problem: &Problem, found: &mut Found, levels: Levels) -> Option<Levels> {
+    with_levels(found, levels.beside_gusts(problem.log), |found| {
+        let step = problem.log.step;
+        found.levels.gusts = likeliest_gusts(problem, found)?;
+        let (change, mut least) = (found.levels.gust_step(step), f64::INFINITY);
+        let mut best = found.levels;
+        for gust_time in TIMES {
+            let mut levels = best;
+            (levels.gust_time, levels.gusts) = (gust_time, 1.0);
+            levels.gusts = change / levels.gust_step(step);
+            found.levels = levels;
+            let now = problem.misfit(found, f64::INFINITY)?;
+            if now > least {
+                break;
+            }
+            (best, least) = (levels, now);
         }
-        (best, least) = (levels, now);
-    }
-    trial.levels = best;
-    Some(trial)
+        Some(best)
+    })
+}
+
+/// The result of `of` for `found` with `levels`. Afterwards `found` has its own levels again: a copy with other levels would have the
+/// whole path.
+fn with_levels<T>(found: &mut Found, levels: Levels, of: impl FnOnce(&mut Found) -> T) -> T {
+    let own = std::mem::replace(&mut found.levels, levels);
+    let result = of(found);
+    found.levels = own;
+    result
 }
 
 /// Fits motion and constants without gusts. The iterations are numbered from `from`.
@@ -180,49 +199,50 @@ fn search(
     Ok(0.0)
 }
 
-/// `found` with the most likely level of the gusts. `None` if the data do not make gusts more likely than white noise of the
-/// air-data sensors.
+/// The noise levels of `found`, which is not changed, with the most likely level of the gusts. `None` if the data do not make gusts
+/// more likely than white noise of the air-data sensors.
 fn rough(
     problem: &Problem,
-    found: &Found,
+    found: &mut Found,
     singular: &dyn Fn() -> ReconstructError,
-) -> Result<Option<Found>, ReconstructError> {
+) -> Result<Option<Levels>, ReconstructError> {
     // if a vane is missing, a filter or a delay of the airspeed sensor would be mistaken for vertical gusts
     if !(problem.log.has.alpha && problem.log.has.beta) {
         return Ok(None);
     }
-    let mut trial = found.clone();
+    let mut levels = found.levels;
     for channel in 3..6 {
-        trial.levels.measured[channel] = trial.levels.white[channel];
-        trial.levels.colour[channel] = 1.0;
+        levels.measured[channel] = levels.white[channel];
+        levels.colour[channel] = 1.0;
     }
-    trial.levels.gusts = likeliest_gusts(problem, &trial).ok_or_else(singular)?;
-    Ok(Some(trial).filter(|trial| trial.levels.gusts > CALM))
+    let gusts = with_levels(found, levels, |found| likeliest_gusts(problem, found));
+    levels.gusts = gusts.ok_or_else(singular)?;
+    Ok(Some(levels).filter(|levels| levels.gusts > CALM))
 }
 
-/// Estimates gusts along the path with the levels of `trial`, which is `found` with gusts.
+/// Estimates gusts along the path of `found`, a fit without gusts, with the noise levels `levels`.
 fn gusty(
     problem: &Problem,
     found: &mut Found,
-    mut trial: Found,
+    levels: Levels,
     singular: &dyn Fn() -> ReconstructError,
 ) -> Result<(), ReconstructError> {
-    let deviations = gusts::deviations(problem, found, &trial, BOUND).ok_or_else(singular)?;
+    let deviations = gusts::deviations(problem, found, &levels, BOUND).ok_or_else(singular)?;
+    found.levels = levels;
     for _ in 0..GUSTY {
-        let solved = problem.held(&trial, BOUND).ok_or_else(singular)?;
-        solved.apply(&mut trial, 1.0, &problem.options.name)?;
+        let solved = problem.held(found, BOUND).ok_or_else(singular)?;
+        solved.apply(found, 1.0, &problem.options.name)?;
     }
-    trial.deviations = deviations;
-    *found = trial;
+    found.deviations = deviations;
     Ok(())
 }
 
-/// The most likely standard deviation of the gusts, m/s. `None` if the equations are singular.
-fn likeliest_gusts(problem: &Problem, found: &Found) -> Option<f64> {
-    let mut trial = found.clone();
+/// The most likely standard deviation of the gusts, m/s. `None` if the equations are singular. The level of the gusts in `found` is
+/// changed by the search.
+fn likeliest_gusts(problem: &Problem, found: &mut Found) -> Option<f64> {
     let mut misfit = |gusts: f64| {
-        trial.levels.gusts = gusts;
-        problem.misfit(&trial, f64::INFINITY)
+        found.levels.gusts = gusts;
+        problem.misfit(found, f64::INFINITY)
     };
     let (mut best, mut least) = (CALM, misfit(CALM)?);
     for coarse in COARSE {

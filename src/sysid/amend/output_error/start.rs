@@ -56,6 +56,28 @@ impl Start {
         Ok(Start { flown, free, theta, given, clocks })
     }
 
+    /// The beginning of a search near `estimates`, names and values of coefficients of a similar model. Other coefficients start at
+    /// their values in `model`. `added` are the added effects of `model`.
+    ///
+    /// # Errors
+    /// If no coefficient is free.
+    pub fn near(
+        model: &GreyBox,
+        added: &[String],
+        estimates: &[(String, f64)],
+    ) -> Result<Start, AmendError> {
+        let added: Vec<&str> = added.iter().map(String::as_str).collect();
+        let free = parameters::free(model, &added);
+        if free.is_empty() {
+            return Err(AmendError::NothingFree { model: model.name.clone() });
+        }
+        let given = values(model, &free);
+        let known = |f: &Free| estimates.iter().find(|(name, _)| *name == f.name);
+        let pairs = free.iter().zip(&given);
+        let theta = pairs.map(|(f, value)| known(f).map_or(*value, |(_, near)| *near)).collect();
+        Ok(Start { flown: model.clone(), free, theta, given, clocks: None })
+    }
+
     /// Searches with one length of the shots after the other. Errors as for `fit`.
     pub fn searched<'a>(
         &'a self,

@@ -75,7 +75,7 @@ fn a_free_run_is_the_recursion_by_hand() {
             (now, last) = (now + DT * rate, now);
             by_hand.push(now);
         }
-        let looks = arx.run(segment, DT, start, &[1, 3], (&[1.0; 8], End::Wrong));
+        let (looks, _) = arx.run(segment, DT, start, &[1, 3], (&[1.0; 8], End::Wrong));
         let flown: Vec<f64> = looks.iter().map(|look| look.unwrap()[1][q]).collect();
         let expected = [by_hand[0], by_hand[2]];
         assert_eq!(flown.len(), 2);
