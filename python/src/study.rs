@@ -11,6 +11,7 @@ use greylag::model::GreyBox;
 use greylag::physics::catalogue;
 use greylag::sysid;
 use greylag::sysid::amend::{Added, Amended, Prior, Refused, document};
+use greylag::sysid::flight_path::installation::{Prior, share};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
 use greylag::sysid::progress::{Progress, Stage};
@@ -63,18 +64,28 @@ impl Reading {
         }
     }
 
-    /// The reconstructed flights of `paths`; the findings of the log readers are appended to `notes`.
+    /// The reconstructed flights of `paths`; the findings of the log readers are appended to `notes`. The constants of the sensors'
+    /// installation that only some of the flights show are used for all of them, and are appended to `installation`, which has
+    /// those of flights that were read before.
     fn flights(
         &self,
         paths: &[PathBuf],
-        model: &GreyBox,
-        clock: ActuatorClock,
+        (model, clock): (&GreyBox, ActuatorClock),
+        installation: &mut Vec<Prior>,
         notes: &mut Vec<String>,
         progress: &Progress,
     ) -> Result<Vec<Reconstruction>, String> {
         let mut flights = Vec::new();
+        let known = installation.clone();
+        let names: Vec<String> = paths.iter().map(|path| name_of(path)).collect();
+        let one = |log: Log, k: usize, priors: &[Prior]| {
+            let options = flight_path::Options::of(&names[k], model, clock);
+            let options = options.expecting(&known).expecting(priors);
+            let cannot = |e| format!("cannot use flight log {}: {e}", paths[k].display());
+            reconstruct(log.flight, &options).map_err(cannot)
+        };
         for (k, path) in paths.iter().enumerate() {
-            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let name = &names[k];
             let doing = format!("reading and reconstructing {name}");
             let share = INTAKE * k as f64 / paths.len() as f64;
             if progress(Stage::new(&doing, share)).is_break() {
@@ -82,12 +93,18 @@ impl Reading {
             }
             let log = self.log(path)?;
             notes.extend(log.findings.iter().map(|f| format!("{name}: {f}")));
-            let options = flight_path::Options::of(&name, model, clock);
-            let cannot = |e| format!("cannot use flight log {}: {e}", path.display());
-            flights.push(reconstruct(&log.flight, &options).map_err(cannot)?);
+            flights.push(one(log, k, &[])?);
         }
+        let common = share(&mut flights, |k, priors| one(self.log(&paths[k])?, k, priors))?;
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        notes.extend(common.sentences(&names));
+        installation.extend(common.priors(None));
         Ok(flights)
     }
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 fn said(error: impl std::fmt::Display) -> String {
@@ -132,7 +149,8 @@ pub fn compare(
         let first = models.first().ok_or("name a model to compare")?;
         let mut notes = Vec::new();
         let clock = ActuatorClock::Estimated;
-        let flights = reading.flights(&logs, first, clock, &mut notes, progress)?;
+        let flights =
+            reading.flights(&logs, (first, clock), &mut Vec::new(), &mut notes, progress)?;
         let options = sysid::compare::Options { horizons_s, seed };
         let stages = after_intake(progress);
         let mut found =
@@ -161,7 +179,8 @@ pub fn diagnose(
         let mut notes = Vec::new();
         let clock = ActuatorClock::AsRecorded;
         distinct(&logs, &[]).map_err(said)?;
-        let flights = reading.flights(&logs, &model, clock, &mut notes, progress)?;
+        let flights =
+            reading.flights(&logs, (&model, clock), &mut Vec::new(), &mut notes, progress)?;
         let options = sysid::diagnose::Options { seed, nulls, without, ..Default::default() };
         let stages = after_intake(progress);
         let mut found =
@@ -194,8 +213,11 @@ pub fn amend(
         let hashes = [hashed(&logs)?, hashed(&hold_out)?];
         let clock = ActuatorClock::AsRecorded;
         let mut notes = Vec::new();
-        let mut flights = reading.flights(&logs, &model, clock, &mut notes, progress)?;
-        let mut tests = reading.flights(&hold_out, &model, clock, &mut notes, progress)?;
+        let (aircraft, mut installation) = ((&model, clock), Vec::new());
+        let mut flights =
+            reading.flights(&logs, aircraft, &mut installation, &mut notes, progress)?;
+        let mut tests =
+            reading.flights(&hold_out, aircraft, &mut installation, &mut notes, progress)?;
         if tests.is_empty() {
             let one = flights.pop().ok_or("name a log to fit to")?;
             notes.push(format!("{}: fitted to its first two thirds, judged by the last", one.name));

@@ -92,7 +92,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         }
     };
     distinct(&arguments.logs.paths, &[])?;
-    let Intake { flights, mut notes, mut in_doubt } = arguments.logs.take_in(&models[0], clock)?;
+    let Intake { flights, mut notes, mut in_doubt, .. } =
+        arguments.logs.take_in(&models[0], clock)?;
     let options = Options { horizons_s: arguments.horizons.clone(), seed: arguments.seed };
     let bar = Bar::new();
     let mut comparison = compare(&models, &flights, &options, &|stage| bar.update(stage))?;

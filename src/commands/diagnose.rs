@@ -87,7 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     distinct(&arguments.logs.paths, &[])?;
     let model = given::model(&arguments.model)?;
-    let Intake { flights, mut notes, in_doubt } =
+    let Intake { flights, mut notes, in_doubt, .. } =
         arguments.logs.take_in(&model, ActuatorClock::AsRecorded)?;
     let options = Options {
         seed: arguments.seed,

@@ -34,7 +34,7 @@ pub fn validation(
         taken.flights = vec![first];
         return Ok(vec![last]);
     }
-    let more = logs.of(held).take_in(model, clock)?;
+    let more = logs.of(held).take_in_as(model, clock, &taken.installation)?;
     taken.notes.extend(more.notes);
     taken.in_doubt |= more.in_doubt;
     Ok(more.flights)

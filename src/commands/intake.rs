@@ -15,6 +15,7 @@ use crate::logs::quoted;
 use crate::logs::sources::Asked;
 use crate::logs::{self, Log, csv::Tolerance};
 use crate::model::GreyBox;
+use crate::sysid::flight_path::installation::{Prior, share};
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::flight_path::{self, ActuatorClock, reconstruct};
 #[cfg(feature = "study")]
@@ -57,6 +58,27 @@ pub struct Intake {
     pub notes: Vec<String>,
     /// Whether a log was left out, or has a finding that makes the results wrong.
     pub in_doubt: bool,
+    /// Priors of the constants of the installation for further flights of the aircraft, such as those held out.
+    pub installation: Vec<Prior>,
+}
+
+/// What the reconstruction of a flight takes besides the log.
+#[derive(Clone, Copy)]
+struct Setting<'a> {
+    model: &'a GreyBox,
+    clock: ActuatorClock,
+    /// Priors from other flights of the aircraft.
+    priors: &'a [Prior],
+}
+
+impl Setting<'_> {
+    /// The reconstructed flight `log` with the name `name` from the file `path`.
+    fn reconstruct(&self, path: &Path, name: &str, log: Log) -> Result<Reconstruction> {
+        let options = flight_path::Options::of(name, self.model, self.clock);
+        let options = options.down_to(log.flies.sustained_s).expecting(self.priors);
+        reconstruct(log.flight, &options)
+            .with_context(|| format!("cannot use flight log {}", path.display()))
+    }
 }
 
 impl Intake {
@@ -64,6 +86,35 @@ impl Intake {
         self.flights.push(flight);
         self.in_doubt |= findings.iter().any(|f| f.severity == Severity::Problem);
         self.notes.extend(findings.iter().map(|f| format!("{name}: {f}")));
+    }
+
+    /// Gives all flights the constants of the sensors' installation that only some of them show. `places` has the file of each
+    /// flight, and the flight's index in that file. A log is read again, because the first reconstruction has dropped it.
+    fn share_installation(
+        &mut self,
+        places: &[(&Path, usize)],
+        reading: &logs::Options,
+        setting: &Setting,
+    ) -> Result<()> {
+        let names: Vec<String> = self.flights.iter().map(|f| f.name.clone()).collect();
+        let again = |k: usize, priors: &[Prior]| -> Result<Reconstruction> {
+            let ((path, place), name) = (places[k], &names[k]);
+            if !bar::is_silent() {
+                eprintln!(
+                    "reconstructing {name} again, with the installation that other flights show"
+                );
+            }
+            let log = logs::flights(path, reading)?.into_iter().nth(place);
+            let log = log.with_context(|| format!("{} has changed", path.display()))?;
+            let (Setting { model, clock, .. }, priors) =
+                (*setting, [setting.priors, priors].concat());
+            Setting { model, clock, priors: &priors }.reconstruct(path, name, log)
+        };
+        let installation = share(&mut self.flights, again)?;
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        self.notes.extend(installation.sentences(&names));
+        self.installation = [setting.priors.to_vec(), installation.priors(None)].concat();
+        Ok(())
     }
 
     fn leave_out(&mut self, error: &anyhow::Error) {
@@ -107,9 +158,20 @@ impl LogArguments {
         mapping.chain(sources).chain(given).collect()
     }
 
-    /// Reads and reconstructs the logs. A log that cannot be used is skipped with an error message.
+    /// Reads and reconstructs the logs. A log that cannot be used is skipped with an error message. A constant of the sensors'
+    /// installation that only some of the flights show is used for all of them.
     pub fn take_in(&self, model: &GreyBox, clock: ActuatorClock) -> Result<Intake> {
         self.reading.take_in(&self.paths, model, clock)
+    }
+
+    /// Reads and reconstructs the logs, which were flown with the `installation` of flights that were taken in before.
+    pub fn take_in_as(
+        &self,
+        model: &GreyBox,
+        clock: ActuatorClock,
+        installation: &[Prior],
+    ) -> Result<Intake> {
+        self.reading.take_in_all(&self.paths, &Setting { model, clock, priors: installation })
     }
 }
 
@@ -150,7 +212,8 @@ impl Reading {
         if self.lenient { Tolerance::Lenient } else { Tolerance::Strict }
     }
 
-    /// Reads and reconstructs the logs `paths`. A log that cannot be used is skipped with an error message.
+    /// Reads and reconstructs the logs `paths`. A log that cannot be used is skipped with an error message. A constant of the
+    /// sensors' installation that only some of the flights show is used for all of them.
     ///
     /// # Errors
     /// If the mapping cannot be read, or no log can be used.
@@ -160,11 +223,15 @@ impl Reading {
         model: &GreyBox,
         clock: ActuatorClock,
     ) -> Result<Intake> {
-        let flies = Flying::from(model.airframe.envelope.flying_from_mps());
+        self.take_in_all(paths, &Setting { model, clock, priors: &[] })
+    }
+
+    fn take_in_all(&self, paths: &[PathBuf], setting: &Setting) -> Result<Intake> {
+        let flies = Flying::from(setting.model.airframe.envelope.flying_from_mps());
         let mut reading = self.options()?;
         reading.flies = reading.mapping.flies(Some(flies));
-        reading.mapping = reading.mapping.with_mixer(model.airframe.mixer.clone());
-        let mut intake = Intake::default();
+        reading.mapping = reading.mapping.with_mixer(setting.model.airframe.mixer.clone());
+        let (mut intake, mut places) = (Intake::default(), Vec::new());
         for (k, (path, name)) in paths.iter().zip(logs::names(paths)).enumerate() {
             if !bar::is_silent() {
                 eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, paths.len());
@@ -186,8 +253,11 @@ impl Reading {
                 let number = log.flight.name.rsplit_once('#').map(|(_, n)| n.to_owned());
                 let number = number.unwrap_or_else(|| (k + 1).to_string());
                 let name = if several { format!("{name}#{number}") } else { name.clone() };
-                match self.reconstruct_one(path, &name, log, model, clock) {
-                    Ok((flight, findings)) => intake.add(flight, &name, &findings),
+                match self.reconstruct_one(path, &name, log, setting) {
+                    Ok((flight, findings)) => {
+                        intake.add(flight, &name, &findings);
+                        places.push((path.as_path(), k));
+                    }
                     Err(error) if paths.len() == 1 && !several => {
                         return Err(error.context("no log can be compared"));
                     }
@@ -198,6 +268,7 @@ impl Reading {
         if intake.flights.is_empty() {
             bail!("no log can be compared: what is wrong with each is said above");
         }
+        intake.share_installation(&places, &reading, setting)?;
         Ok(intake)
     }
 
@@ -207,16 +278,13 @@ impl Reading {
         path: &Path,
         name: &str,
         log: Log,
-        model: &GreyBox,
-        clock: ActuatorClock,
+        setting: &Setting,
     ) -> Result<(Reconstruction, Vec<Finding>)> {
         if !self.despite_problems {
             refuse_problems(path, &log.findings)?;
         }
-        let options = flight_path::Options::of(name, model, clock).down_to(log.flies.sustained_s);
-        let flight = reconstruct(log.flight, &options)
-            .with_context(|| format!("cannot use flight log {}", path.display()))?;
-        Ok((flight, log.findings))
+        let findings = log.findings.clone();
+        Ok((setting.reconstruct(path, name, log)?, findings))
     }
 }
 

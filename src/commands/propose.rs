@@ -70,9 +70,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let with = named_effects(&arguments.effects)?;
     let (search, test) = divided(arguments)?;
     let clock = ActuatorClock::AsRecorded;
-    let Intake { flights, mut notes, mut in_doubt } =
+    let Intake { flights, mut notes, mut in_doubt, installation } =
         arguments.logs.of(search).take_in(&model, clock)?;
-    let tests = arguments.logs.of(test).take_in(&model, clock)?;
+    let tests = arguments.logs.of(test).take_in_as(&model, clock, &installation)?;
     in_doubt |= tests.in_doubt;
     notes.extend(tests.notes);
     let options = Options {

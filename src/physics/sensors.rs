@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 /// The constants of sensors and wind that the flight-path reconstruction estimates, each with its unit.
-pub const CONSTANTS: [(&str, &str); 30] = [
+pub const CONSTANTS: [(&str, &str); 31] = [
     ("alpha_bias", "rad"),
     ("beta_bias", "rad"),
     ("airspeed_scale", ""),
@@ -33,6 +33,7 @@ pub const CONSTANTS: [(&str, &str); 30] = [
     ("beta_gain", ""),
     ("airspeed_offset", "m/s"),
     ("heading_offset", "rad"),
+    ("board_roll", "rad"),
     ("gyro_bias_p", "rad/s"),
     ("gyro_bias_q", "rad/s"),
     ("gyro_bias_r", "rad/s"),
@@ -225,7 +226,12 @@ impl Sensors {
 
     /// Fixes the constant `name` of [`CONSTANTS`] at `value` (in its unit), unless a prior is stated.
     pub fn hold(&mut self, name: &'static str, value: f64) {
-        self.constants.entry(name).or_insert(Known { value, sd: 0.0 });
+        self.expect(name, Known { value, sd: 0.0 });
+    }
+
+    /// States `prior` for the constant `name` of [`CONSTANTS`], unless a prior is stated.
+    pub fn expect(&mut self, name: &'static str, prior: Known) {
+        self.constants.entry(name).or_insert(prior);
     }
 
     /// Wind velocity north, east, down (m/s). `None` if its horizontal part is not stated. An unstated vertical part is zero.

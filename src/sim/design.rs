@@ -264,6 +264,7 @@ fn imagine(
         clock: ActuatorClock::AsRecorded,
         segments: vec![Segment { instants }],
         nuisances: Vec::new(),
+        installation: Vec::new(),
         noise,
         left: noise,
         force_noise,

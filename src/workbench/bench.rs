@@ -183,7 +183,7 @@ impl Bench {
             return Err(WorkbenchError::Conflict { now, seen });
         }
         let before = Before::of(&inner);
-        let edited = edit(&mut inner);
+        let edited = edit(&mut inner).inspect(|_| inner.share_installation());
         inner.session.revision += 1;
         let revision = inner.session.revision;
         match edited.and_then(|t| inner.session.write(&self.folder).map(|()| t)) {

@@ -13,6 +13,7 @@ use greylag_logs::phases::Flying;
 use greylag_logs::{self as logs, Log};
 use greylag_model::GreyBox;
 use greylag_sysid::amend::document::sha256;
+use greylag_sysid::flight_path::installation::{Estimate, Prior};
 use greylag_sysid::flight_path::reconstruction::Reconstruction;
 use greylag_sysid::flight_path::{self, ActuatorClock, reconstruct};
 use greylag_sysid::weak_form::prepared::Prepared;
@@ -30,6 +31,10 @@ pub struct Loaded {
     pub flight: Reconstruction,
     /// The flight, prepared for simulations and comparisons of models.
     pub prepared: Prepared,
+    /// Estimates of the constants of the sensors' installation from this flight alone.
+    pub alone: Vec<Estimate>,
+    /// Priors of such constants from the flights of the session, with which this flight was reconstructed.
+    pub priors: Vec<Prior>,
     /// The same with the deflections on the time base of the gyros; `None` if their recorded times need no correction.
     corrected: Option<Box<(Reconstruction, Prepared)>>,
 }
@@ -61,18 +66,34 @@ impl Loaded {
         reading: &logs::Options,
         model: &GreyBox,
     ) -> Result<Arc<Loaded>, WorkbenchError> {
+        Ok(Arc::new(Loaded::parse_as(bytes, name, (reading, model), Vec::new())?))
+    }
+
+    /// As [`parse`](Self::parse), with `priors` of the constants of the installation that other flights give.
+    fn parse_as(
+        bytes: &[u8],
+        name: &str,
+        (reading, model): (&logs::Options, &GreyBox),
+        priors: Vec<Prior>,
+    ) -> Result<Loaded, WorkbenchError> {
         let mixer = model.airframe.mixer.clone();
         let flies = Flying::from(model.airframe.envelope.flying_from_mps());
         let mapping = reading.mapping.clone().with_mixer(mixer);
         let flies = mapping.flies(Some(flies));
         let reading = logs::Options { flies, mapping, ..reading.clone() };
         let log = logs::parse(bytes, Path::new(name), &reading)?;
-        Loaded::of(&log, name, model)
+        Loaded::of(&log, name, model, priors)
     }
 
-    fn of(log: &Log, name: &str, model: &GreyBox) -> Result<Arc<Loaded>, WorkbenchError> {
+    fn of(
+        log: &Log,
+        name: &str,
+        model: &GreyBox,
+        priors: Vec<Prior>,
+    ) -> Result<Loaded, WorkbenchError> {
         let options = flight_path::Options::of(name, model, ActuatorClock::AsRecorded)
-            .down_to(log.flies.sustained_s);
+            .down_to(log.flies.sustained_s)
+            .expecting(&priors);
         let flight = reconstruct(&log.flight, &options)?;
         let slowest = model.airframe.envelope.flying_from_mps();
         let prepared = Prepared::new(&flight, slowest)?;
@@ -84,13 +105,15 @@ impl Loaded {
             }
             None => None,
         };
-        Ok(Arc::new(Loaded {
+        Ok(Loaded {
             info: Info::of(log),
             findings: log.findings.clone(),
+            alone: flight.installation.clone(),
+            priors,
             flight,
             prepared,
             corrected,
-        }))
+        })
     }
 
     /// The flight with the deflections on the time base `clock`.
@@ -111,12 +134,25 @@ impl Loaded {
         reading: &logs::Options,
         model: &GreyBox,
     ) -> Result<Arc<Loaded>, WorkbenchError> {
+        Ok(Arc::new(Loaded::read_as(entry, folder, (reading, model), Vec::new())?))
+    }
+
+    /// As [`read`](Self::read), with `priors` of the constants of the installation that other flights give.
+    ///
+    /// # Errors
+    /// As `read`.
+    pub fn read_as(
+        entry: &LogEntry,
+        folder: &Path,
+        by: (&logs::Options, &GreyBox),
+        priors: Vec<Prior>,
+    ) -> Result<Loaded, WorkbenchError> {
         let path = folder.join(&entry.path);
         let bytes = std::fs::read(&path).map_err(|e| io(&path, e))?;
         if sha256(&bytes) != entry.sha256 {
             return Err(WorkbenchError::LogChanged { path });
         }
-        Loaded::parse(&bytes, &entry.name(), reading, model)
+        Loaded::parse_as(&bytes, &entry.name(), by, priors)
     }
 
     /// Whether the log has defects that make results computed from it wrong.

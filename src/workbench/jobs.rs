@@ -207,7 +207,7 @@ impl Bench {
 
     /// Diagnoses the given model with the flights that have the role Fit. Then fits its coefficients, as a start for later fits.
     fn diagnose(&self, progress: &Progress) -> Result<(), WorkbenchError> {
-        let ([key, tuned_key], model, flights, divided, with, tried) = {
+        let ([key, tuned_key], model, flights, divided, said, with, tried) = {
             let inner = self.lock();
             let keys = [Work::Diagnosis.word(), "tuned"].map(|what| inner.key(what, &[]));
             (
@@ -215,12 +215,14 @@ impl Bench {
                 inner.model.clone(),
                 inner.to_fit()?,
                 inner.divided(),
+                inner.said_of_installation(),
                 inner.session.own.clone(),
                 inner.tried(),
             )
         };
-        let diagnosis =
+        let mut diagnosis =
             diagnose(&model, &flights, &Options { with, ..Options::default() }, progress)?;
+        diagnosis.notes.splice(0..0, said);
         let mut value = serde_json::to_value(&diagnosis)?;
         value[TRIED] = tried;
         write_over(&self.result_file(&key), value.to_string())?;

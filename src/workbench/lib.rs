@@ -14,6 +14,7 @@ mod failsafe;
 mod fit;
 mod flights;
 mod fly;
+mod installation;
 mod jobs;
 mod key;
 mod mapping;

@@ -108,11 +108,12 @@ impl Inner {
         logs::Options { tolerance: given.tolerance, sources, ..Default::default() }
     }
 
-    /// Reads all logs again.
+    /// Reads all logs again, and gives all flights the installation that some of them show.
     pub fn reread(&mut self) {
         let read = |entry: &LogEntry| {
             Loaded::read(entry, &self.folder, &self.options, &self.model).map_err(|e| e.to_string())
         };
         self.flights = self.session.logs.iter().map(read).collect();
+        self.share_installation();
     }
 }

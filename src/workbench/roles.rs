@@ -168,6 +168,7 @@ impl Inner {
         let fit = self.to_fit()?;
         let held = self.usable(&[Role::HoldOut]);
         let mut notes = self.findings(&self.usable(&[Role::Fit]));
+        notes.extend(self.said_of_installation());
         match (&fit[..], &held[..]) {
             ([only], []) => {
                 let name = &only.name;

@@ -169,6 +169,7 @@ pub fn as_measured(name: &str, flight: &Flight, noise: Noise) -> Reconstruction 
         clock: greylag::sysid::flight_path::ActuatorClock::AsRecorded,
         segments: vec![Segment { instants: flight.samples.iter().map(instant).collect() }],
         nuisances: Vec::new(),
+        installation: Vec::new(),
         noise: noise.state,
         left: noise.state,
         force_noise: [noise.force; 3],

@@ -125,7 +125,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let (logs, hold_out) = (hashed(&paths)?, hashed(&held)?);
     let mut taken = arguments.logs.of(paths).take_in(&model, ActuatorClock::AsRecorded)?;
     let tests = tests(arguments, held, &model, &mut taken)?;
-    let Intake { flights, notes, mut in_doubt } = taken;
+    let Intake { flights, notes, mut in_doubt, .. } = taken;
     let options = options(arguments, wanted(arguments, &effects, &model, &flights)?);
     let bar = Bar::new();
     let on_stage = |stage: Stage<'_>| bar.update(stage);

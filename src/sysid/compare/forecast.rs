@@ -265,6 +265,7 @@ mod tests {
             clock: ActuatorClock::AsRecorded,
             segments: vec![Segment { instants: instants.collect() }],
             nuisances: Vec::new(),
+            installation: Vec::new(),
             noise: [f64::NAN; 8],
             left: [f64::NAN; 8],
             force_noise: [f64::NAN; 3],

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use along::{Along, PROCESS, step_deviations};
 
 use crate::flight_path::band::{self, Keep, Left, Stretch};
+use crate::flight_path::calibration::Suspect;
 use crate::flight_path::intake::{Log, Track};
 use crate::flight_path::kinematics::{Drive, MOTION, MOTION_AND_GUST};
 use crate::flight_path::levels::Levels;
@@ -39,6 +40,9 @@ pub struct Found {
     pub widths: Values,
     /// Noise levels of the sensors.
     pub levels: Levels,
+    /// Rare errors that are held at their prior means, with their estimates without the prior. Empty in strong gusts, whose effect
+    /// the standard deviations of these estimates do not contain.
+    pub suspects: Vec<Suspect>,
 }
 
 /// Data and priors of a fit.

@@ -12,11 +12,11 @@ use crate::flight_path::intake::Track;
 use crate::flight_path::kinematics::MOTION_AND_GUST;
 use crate::flight_path::lever_arm::air_at;
 use crate::flight_path::nuisance::{
-    AIRSPEED_OFFSET, ALPHA, BETA, HEADING, INERTIAL, SCALE, SKEW_AIRSPEED, SKEW_ATTITUDE,
-    SKEW_VANES, SKEW_VELOCITY, VANE_GAIN, Values, WIND,
+    AIRSPEED_OFFSET, ALPHA, BETA, BOARD_ROLL, HEADING, INERTIAL, SCALE, SKEW_AIRSPEED,
+    SKEW_ATTITUDE, SKEW_VANES, SKEW_VELOCITY, VANE_GAIN, Values, WIND,
 };
 use crate::flight_path::path::{CHANNELS, Path, SLOW, flow_angles};
-use crate::flight_path::rotation::{cross, euler_by_turn, to_euler};
+use crate::flight_path::rotation::{cross, euler_by_turn, to_euler, unrolled};
 
 /// Number of columns for the constants that act at instants and for the right-hand side.
 pub const AT: usize = INERTIAL + 1;
@@ -65,25 +65,55 @@ pub fn measured(track: &Track, channel: usize, k: usize) -> f64 {
     }
 }
 
-/// Derivatives of airspeed, α and β with respect to the velocity `u` relative to the air (body axes, m/s). `None` at low
-/// airspeed.
-fn air_slopes(u: &Vector3<f64>) -> Option<Matrix3<f64>> {
-    let (v, plane) = (u.norm(), u.x.hypot(u.z));
+/// Derivatives of airspeed, α and β at the vanes with respect to the velocity `u` relative to the air (m/s, axes of the board, which
+/// is rolled by `roll` against the vanes, rad). `None` at low airspeed.
+fn air_slopes(u: &Vector3<f64>, roll: f64) -> Option<Matrix3<f64>> {
+    let seen = unrolled(u, roll);
+    let (v, plane) = (u.norm(), seen.x.hypot(seen.z));
     (plane >= SLOW).then(|| {
-        let beta = (Vector3::y() - u * (u.y / (v * v))) / plane;
+        let beta = (Vector3::y() - seen * (seen.y / (v * v))) / plane;
         let p2 = plane * plane;
-        let alpha = Vector3::new(-u.z / p2, 0.0, u.x / p2);
+        let alpha = Vector3::new(-seen.z / p2, 0.0, seen.x / p2);
+        let [alpha, beta] = [alpha, beta].map(|slope| unrolled(&slope, -roll));
         Matrix3::from_columns(&[u / v, alpha, beta]).transpose()
     })
 }
 
+/// Sets the derivatives of airspeed, α and β with respect to the errors of their sensors. `u` is the velocity relative to the air
+/// (m/s, axes of the board), `from` the column of the first constant.
+fn by_errors<const M: usize>(
+    u: &Vector3<f64>,
+    values: &Values,
+    from: usize,
+    constants: &mut [[f64; M]; CHANNELS],
+) {
+    constants[3][from + SCALE] = u.norm();
+    constants[3][from + AIRSPEED_OFFSET] = 1.0;
+    (constants[4][from + ALPHA], constants[5][from + BETA]) = (1.0, 1.0);
+    let seen = unrolled(u, values[BOARD_ROLL]);
+    let plane = seen.x.hypot(seen.z);
+    let rolls = [seen.x * seen.y / (plane * plane), -seen.z / plane];
+    let angles = flow_angles(&seen);
+    for vane in 0..2 {
+        let gain = VANE_GAIN + vane;
+        constants[4 + vane][from + gain] = angles[vane];
+        constants[4 + vane][from + BOARD_ROLL] = rolls[vane] * (1.0 + values[gain]);
+    }
+}
+
 /// Values of error-free sensors at sample `k`, by channel. The vanes are at the position `vanes_at` (m from the centre of
-/// gravity, body axes).
-fn shown(path: &Path, k: usize, rates: &[f64; 3], vanes_at: Option<[f64; 3]>) -> [f64; CHANNELS] {
+/// gravity, body axes), and the board is rolled by `roll` (rad) against them.
+fn shown(
+    path: &Path,
+    k: usize,
+    rates: &[f64; 3],
+    vanes_at: Option<[f64; 3]>,
+    roll: f64,
+) -> [f64; CHANNELS] {
     let [roll, pitch, yaw] = to_euler(&path.attitude[k]);
     let u = path.air_velocity(k);
     let at_vanes = vanes_at.map(|at| air_at(&u, &Vector3::from(*rates), at));
-    let [alpha, beta] = flow_angles(&at_vanes.unwrap_or(u));
+    let [alpha, beta] = flow_angles(&unrolled(&at_vanes.unwrap_or(u), roll));
     let ground = path.velocity[k];
     [roll, pitch, yaw, u.norm(), alpha, beta, ground.x, ground.y, ground.z]
 }
@@ -97,7 +127,7 @@ fn scale(slopes: &mut Matrix3<f64>, values: &Values) {
 
 /// Derivatives of measured airspeed, α and β with respect to a gust at sample `k`, earth axes. `None` at low airspeed.
 pub fn by_gust(path: &Path, k: usize, values: &Values) -> Option<Matrix3<f64>> {
-    let mut slopes = air_slopes(&path.air_velocity(k))?;
+    let mut slopes = air_slopes(&path.air_velocity(k), values[BOARD_ROLL])?;
     scale(&mut slopes, values);
     Some(slopes * -path.attitude[k].transpose())
 }
@@ -135,7 +165,8 @@ impl<'a> Predicted<'a> {
         vanes_at: Option<[f64; 3]>,
     ) -> Predicted<'a> {
         let samples = (0..path.len()).into_par_iter().with_min_len(1000);
-        let shown = samples.map(|k| shown(path, k, &track.rates[k], vanes_at)).collect();
+        let of = |k: usize| shown(path, k, &track.rates[k], vanes_at, values[BOARD_ROLL]);
+        let shown = samples.map(of).collect();
         Predicted { track, values, step, shown }
     }
 
@@ -267,7 +298,7 @@ fn slopes<const N: usize, const M: usize>(
             *node = Some(row);
         }
     }
-    if let Some(mut slopes) = air_slopes(&u) {
+    if let Some(mut slopes) = air_slopes(&u, values[BOARD_ROLL]) {
         scale(&mut slopes, values);
         let (by_turn, by_velocity) = (slopes * cross(&u), slopes * body);
         for i in 0..3 {
@@ -285,12 +316,7 @@ fn slopes<const N: usize, const M: usize>(
             nodes[3 + i] = Some(row);
         }
         if M > 1 {
-            constants[3][from + SCALE] = u.norm();
-            constants[3][from + AIRSPEED_OFFSET] = 1.0;
-            (constants[4][from + ALPHA], constants[5][from + BETA]) = (1.0, 1.0);
-            let [alpha, beta] = flow_angles(&u);
-            constants[4][from + VANE_GAIN] = alpha;
-            constants[5][from + VANE_GAIN + 1] = beta;
+            by_errors(&u, values, from, &mut constants);
         }
     }
     for (channel, node) in nodes.iter_mut().enumerate().skip(6) {
@@ -305,4 +331,37 @@ fn slopes<const N: usize, const M: usize>(
         }
     }
     (nodes, constants)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flight_path::nuisance::COUNT;
+
+    /// The analytic derivatives must equal central differences of the vanes' readings.
+    #[test]
+    fn a_rolled_board_turns_the_slopes_of_the_vanes() {
+        const STEP: f64 = 1e-6;
+        let (u, roll) = (Vector3::new(16.0, 2.5, 1.8), 0.04);
+        let seen = |u: Vector3<f64>, roll: f64| flow_angles(&unrolled(&u, roll));
+        let slopes = air_slopes(&u, roll).unwrap();
+        let close = |up: [f64; 2], down: [f64; 2], slope: [f64; 2]| {
+            for vane in 0..2 {
+                let differences = (up[vane] - down[vane]) / (2.0 * STEP);
+                assert!((differences - slope[vane]).abs() < 1e-8, "{differences} {slope:?}");
+            }
+        };
+        for axis in 0..3 {
+            let mut by = Vector3::zeros();
+            by[axis] = STEP;
+            let slope = [slopes[(1, axis)], slopes[(2, axis)]];
+            close(seen(u + by, roll), seen(u - by, roll), slope);
+        }
+        let mut values = [0.0; COUNT];
+        values[BOARD_ROLL] = roll;
+        let mut constants = [[0.0; AT]; CHANNELS];
+        by_errors(&u, &values, 0, &mut constants);
+        let slope = [constants[4][BOARD_ROLL], constants[5][BOARD_ROLL]];
+        close(seen(u, roll + STEP), seen(u, roll - STEP), slope);
+    }
 }

@@ -11,7 +11,7 @@ const PATH: &str = "kinematics of a rigid body, which hold no aerodynamics; Klei
                     Identification, section 10.2";
 
 /// Descriptions of all measurement effects.
-pub const MEASUREMENT_EFFECTS: [Description; 10] = [
+pub const MEASUREMENT_EFFECTS: [Description; 11] = [
     Description {
         id: "steady_wind",
         description: "The air moves over the ground.",
@@ -141,6 +141,25 @@ pub const MEASUREMENT_EFFECTS: [Description; 10] = [
             channels: &[],
             look_alikes: &["steady_wind", "beta_bias", "asymmetry"],
             separated_by: "turns to both sides through all headings",
+            example: &[],
+            starts: &[],
+        })
+    },
+    Description {
+        id: "vanes_askew",
+        description: "The vanes and the board with gyros and accelerometers are rolled against each other.",
+        formula: "x_board = x + g (0, z, −y), for x = (x, y, z) in the axes of the vanes",
+        source: PATH,
+        coefficients: &[coefficient(
+            "board_roll",
+            "rotation about the forward axis from the vanes to the board",
+            "rad",
+            (-0.5, 0.5),
+        )],
+        ..measured(&Entry {
+            channels: &[],
+            look_alikes: &["vane_gain", "inertia_xz", "asymmetry"],
+            separated_by: "sideslips and pull-ups with both vanes and the velocity over ground logged",
             example: &[],
             starts: &[],
         })

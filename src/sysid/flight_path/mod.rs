@@ -3,6 +3,7 @@
 //!
 //! It uses only kinematic equations, which contain no aerodynamics. No aerodynamic model of the aircraft is therefore needed.
 
+pub mod installation;
 pub mod measurement_effects;
 pub mod reconstruction;
 
@@ -201,9 +202,11 @@ pub fn reconstruct(
     let (means, widths) = (nuisance::prior_means(&log), nuisance::prior_widths(&log));
     let problem = Problem { log: &log, options, sampling: Sampling::Instants, means, widths };
     let Chosen { sampling, found, note } = sampling::choose(&problem, declared)?;
+    let installation = calibration::installed(&problem, &found);
     let widths = found.widths;
     let mut outcome = outcome::assemble(&Problem { sampling, widths, ..problem }, &found)?;
     outcome.notes.extend(note);
+    outcome.installation = installation;
     Ok(outcome)
 }
 

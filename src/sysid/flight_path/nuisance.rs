@@ -8,7 +8,7 @@ use crate::flight_path::intake::{Log, Present, Span};
 use greylag_physics::sensors::CONSTANTS;
 
 /// Number of estimated constants.
-pub const COUNT: usize = 41;
+pub const COUNT: usize = 42;
 /// Index of the angle-of-attack vane's bias, rad.
 pub const ALPHA: usize = 0;
 /// Index of the sideslip vane's bias, rad.
@@ -32,38 +32,44 @@ const BETA_GAIN: usize = VANE_GAIN + 1;
 pub const AIRSPEED_OFFSET: usize = 12;
 /// Index of the offset of the measured heading relative to the velocity over ground, rad.
 pub const HEADING: usize = 13;
+/// Index of the roll angle of the board (gyros, accelerometers, attitude) against the vanes, rad: the rotation about the forward
+/// axis from the vanes' axes to the board's axes.
+///
+/// With such a roll, the vanes show the sideslip at the board as an angle of attack and vice versa. A pitch or yaw of the board
+/// changes α or β by a constant, which is the bias of the vane.
+pub const BOARD_ROLL: usize = 14;
 /// Index of the first constant that acts between instants. Constants with smaller indices act on the measurements at instants.
-pub const INERTIAL: usize = 14;
+pub const INERTIAL: usize = 15;
 /// First index of the gyro biases p, q, r in the middle of the flight, rad/s.
-pub const GYRO: usize = 14;
+pub const GYRO: usize = 15;
 /// First index of the accelerometer biases x, y, z, m/s².
-pub const FORCE: usize = 17;
+pub const FORCE: usize = 18;
 /// Index of the accelerometers' delay relative to the gyros, s.
-pub const SKEW_FORCE: usize = 20;
+pub const SKEW_FORCE: usize = 21;
 /// First index of the drift rates of the gyro biases p, q, r, rad/s².
 ///
 /// The gyro biases of ArduPilot's SITL drift by 0.05°/s per minute, like those of a gyro that warms up. With constant
 /// biases, the heading error was 1.5° after four minutes.
-pub const DRIFT: usize = 21;
+pub const DRIFT: usize = 22;
 /// First index of the gains of the gyros p, q, r less 1.
-pub const GYRO_GAIN: usize = 24;
+pub const GYRO_GAIN: usize = 25;
 /// First index of the gains of the accelerometers x, y, z less 1.
-pub const FORCE_GAIN: usize = 27;
+pub const FORCE_GAIN: usize = 28;
 /// First index of the changes of the drift rates at the inner knots of the flight, p, q, r for each knot, rad/s². The drift
 /// of ArduPilot's SITL reverses after five minutes.
-pub const BEND: usize = 30;
+pub const BEND: usize = 31;
 /// Number of inner knots, equally spaced between the ends of the flight.
 const KNOTS: usize = 3;
 /// First index of the Earth's rate north and down, rad/s.
 ///
 /// A log without a latitude does not determine this rate. The Coriolis acceleration, 0.003 m/s² at 20 m/s, is twice the
 /// standard deviation of an accelerometer bias after a minute.
-pub const EARTH: usize = 39;
+pub const EARTH: usize = 40;
 
 /// Indices of the constants in the order of the result.
 pub const ORDER: [usize; BEND] = [
-    14, 15, 16, 21, 22, 23, 24, 25, 26, 17, 18, 19, 27, 28, 29, 0, 1, 10, 11, 2, 12, 13, 3, 4, 5,
-    6, 20, 7, 8, 9,
+    15, 16, 17, 22, 23, 24, 25, 26, 27, 18, 19, 20, 28, 29, 30, 0, 1, 10, 11, 14, 2, 12, 13, 3, 4,
+    5, 6, 21, 7, 8, 9,
 ];
 
 /// Prior standard deviation of a delay, in sampling intervals. The 95 % interval is ±1.5 sampling intervals.
@@ -110,11 +116,12 @@ pub const HELD: f64 = 1e-4;
 
 /// Rare instrument errors with their prior standard deviations. They are held at zero until a flight shows them
 /// significantly (see `calibration`).
-const SELDOM: [(usize, f64); 10] = [
+const SELDOM: [(usize, f64); 11] = [
     (VANE_GAIN, 0.2),
     (VANE_GAIN + 1, 0.2),
     (AIRSPEED_OFFSET, 2.0),
     (HEADING, 10.0 * std::f64::consts::PI / 180.0),
+    (BOARD_ROLL, 5.0 * std::f64::consts::PI / 180.0),
     (GYRO_GAIN, 0.1),
     (GYRO_GAIN + 1, 0.1),
     (GYRO_GAIN + 2, 0.1),
@@ -129,6 +136,11 @@ const LATE: f64 = 0.5;
 pub fn wide(place: usize) -> Option<f64> {
     let late = matches!(place, SKEW_ATTITUDE..=SKEW_VELOCITY | SKEW_FORCE);
     SELDOM.iter().find(|(of, _)| *of == place).map(|(_, width)| *width).or(late.then_some(LATE))
+}
+
+/// Prior standard deviation that holds a rare instrument error at its prior mean, if its usual one is `width`.
+pub fn exact(place: usize, width: f64) -> f64 {
+    wide(place).map_or(width, |wide| width.min(HELD * wide))
 }
 
 /// Whether a rare instrument error, whose prior standard deviation is `width`, is still held at its prior mean.
@@ -235,6 +247,7 @@ pub fn concerned(place: usize, has: &Present) -> bool {
         ALPHA | VANE_GAIN => has.alpha,
         BETA | BETA_GAIN => has.beta,
         SKEW_VANES => has.alpha || has.beta,
+        BOARD_ROLL => has.alpha && has.beta,
         FORCE..=SKEW_FORCE => has.force,
         SKEW_VELOCITY => has.velocity,
         HEADING => has.yaw && has.velocity,
@@ -252,7 +265,8 @@ pub fn concerned(place: usize, has: &Present) -> bool {
 pub fn unseeable(place: usize, has: &Present) -> bool {
     let of_the_air = place < SKEW_ATTITUDE
         || place == SKEW_AIRSPEED
-        || (SKEW_VANES..=AIRSPEED_OFFSET).contains(&place) && place != SKEW_VELOCITY;
+        || (SKEW_VANES..=AIRSPEED_OFFSET).contains(&place) && place != SKEW_VELOCITY
+        || place == BOARD_ROLL;
     of_the_air && !has.force && !has.velocity
 }
 

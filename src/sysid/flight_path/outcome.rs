@@ -93,6 +93,7 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
         clock: ActuatorClock::AsRecorded,
         segments,
         nuisances,
+        installation: Vec::new(),
         noise: [m[0], m[1], m[3], l.gyro[0], l.gyro[1], l.gyro[2], m[4], m[5]],
         left,
         force_noise: if log.has.force { l.force } else { [m[6].max(m[7]) / log.step; 3] },

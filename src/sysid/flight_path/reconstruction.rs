@@ -1,6 +1,7 @@
 //! A reconstructed flight: segments with uniform time steps, sensor errors removed.
 
 use crate::flight_path::ActuatorClock;
+use crate::flight_path::installation::Estimate;
 use greylag_logs::rudder::RudderMotion;
 use greylag_logs::{Flight, Sample, Sampling};
 use greylag_physics::sensors::Known;
@@ -75,6 +76,9 @@ pub struct Reconstruction {
     pub segments: Vec<Segment>,
     /// Estimated sensor errors, wind, actuator delay and, without vanes, uncertainties of α and β.
     pub nuisances: Vec<Nuisance>,
+    /// Estimates of the constants of the installation from this flight alone. Constants that the flight hardly determines, that gusts
+    /// bias or that are stated beforehand have no entry.
+    pub installation: Vec<Estimate>,
     /// Standard deviations of the measurement noise as logged, before smoothing, in the order roll, pitch, airspeed,
     /// p, q, r, alpha, beta (units of [`State`]).
     pub noise: [f64; 8],
@@ -105,6 +109,7 @@ impl Reconstruction {
             clock: ActuatorClock::AsRecorded,
             segments: Vec::new(),
             nuisances: Vec::new(),
+            installation: Vec::new(),
             noise: [0.0; 8],
             left: [0.0; 8],
             force_noise: [0.0; 3],

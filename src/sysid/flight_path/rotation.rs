@@ -28,6 +28,12 @@ pub fn log(r: &Matrix3<f64>) -> Vector3<f64> {
     if sine < 1e-8 { half } else { half * (sine.atan2(cosine) / sine) }
 }
 
+/// The vector `x`, given in the axes of a board that is rolled by `roll` (rad) about the forward axis, in the axes before the roll.
+pub fn unrolled(x: &Vector3<f64>, roll: f64) -> Vector3<f64> {
+    let (sin, cos) = roll.sin_cos();
+    Vector3::new(x.x, cos * x.y - sin * x.z, sin * x.y + cos * x.z)
+}
+
 /// Rotation matrix from body to earth axes for the Euler angles roll, pitch and yaw (ZYX), rad.
 pub fn from_euler([roll, pitch, yaw]: [f64; 3]) -> Matrix3<f64> {
     let ((sr, cr), (sp, cp), (sy, cy)) = (roll.sin_cos(), pitch.sin_cos(), yaw.sin_cos());
@@ -70,6 +76,18 @@ pub fn orthonormal(r: &Matrix3<f64>) -> Matrix3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_a_rolled_board_measures_is_turned_back() {
+        // the board's y axis points down by the roll angle: gravity has a component along it
+        let roll = 0.3_f64;
+        let measured = Vector3::new(0.0, roll.sin(), roll.cos());
+        assert!((unrolled(&measured, roll) - Vector3::z()).norm() < 1e-15);
+        // to first order x + x × ε, the same convention as the misalignment angles
+        let (x, small) = (Vector3::new(0.3, -0.2, 0.9), 1e-6);
+        let seen = x + x.cross(&Vector3::new(small, 0.0, 0.0));
+        assert!((unrolled(&seen, small) - x).norm() < 1e-11);
+    }
 
     #[test]
     fn euler_angles_and_turns_come_back() {

@@ -14,7 +14,7 @@ use crate::flight_path::equations::{Found, Problem, Solved, no_path};
 use crate::flight_path::gusts;
 use crate::flight_path::kinematics::MOTION;
 use crate::flight_path::levels::{CALM, GUST_TIME, Levels};
-use crate::flight_path::nuisance::{self, SKEW_AIRSPEED, SKEW_VANES, WIND};
+use crate::flight_path::nuisance::{self, WIND};
 use crate::flight_path::path::Path;
 
 /// Standard deviations of the gusts that are tried first, m/s. `FINE` holds the factors of the refinement around the best
@@ -26,8 +26,6 @@ const FINE: [f64; 3] = [2.0, 1.4, 1.2];
 const STRONG: f64 = 0.5;
 /// Residuals beyond this number of standard deviations are down-weighted.
 const BOUND: f64 = 4.0;
-/// Delays of the air-data sensors.
-const LATE: [usize; 2] = [SKEW_AIRSPEED, SKEW_VANES];
 /// Correlation times of gusts that are tried, s.
 const TIMES: [f64; 6] = [GUST_TIME, 10.0, 5.0, 2.5, 1.2, 0.6];
 /// Number of iterations with gusts.
@@ -74,6 +72,7 @@ fn first(problem: &Problem) -> Result<Found, ReconstructError> {
         deviations: widths,
         widths,
         levels: Levels::first(log),
+        suspects: Vec::new(),
     };
     start(&mut found, problem);
     calm(problem, &mut found, 0)?;
@@ -81,26 +80,29 @@ fn first(problem: &Problem) -> Result<Found, ReconstructError> {
 }
 
 /// Fits again from `before`, a fit without rare errors of the sensors, if gusts are strong. Errors of the air-data sensors keep
-/// their priors, because gusts bias their estimates. Any other error must be beyond doubt with the standard deviation that gusts give it, too.
+/// their prior means and standard deviations, because gusts bias their estimates. Any other error must be beyond doubt with the
+/// standard deviation that gusts give it, too.
 fn in_gusts(problem: &Problem, before: &Found) -> Result<Found, ReconstructError> {
     let singular = || no_path(&problem.options.name, "the equations became singular");
     let mut held = calibration::OF_AIR.to_vec();
     loop {
         let (mut freed, mut found) = (*problem, before.clone());
-        // gusts tell nothing of the delays of the air-data sensors either
-        LATE.iter().for_each(|place| freed.widths[*place] *= nuisance::HELD);
+        for place in calibration::OF_AIR {
+            freed.widths[place] = nuisance::exact(place, freed.widths[place]);
+        }
         calm(&freed, &mut found, FIRST)?;
         free(&mut freed, &mut found, &held)?;
         if let Some(levels) = rough(&freed, &mut found, &singular)? {
             let levels = correlated(&freed, &mut found, levels).ok_or_else(singular)?;
             gusty(&freed, &mut found, levels, &singular)?;
         }
-        for place in LATE {
+        for place in calibration::OF_AIR {
             found.widths[place] = problem.widths[place];
             found.deviations[place] = problem.widths[place];
         }
         let doubtful = calibration::doubtful(problem, &found);
         if doubtful.is_empty() {
+            found.suspects.clear();
             return Ok(found);
         }
         held.extend(doubtful);
@@ -110,12 +112,15 @@ fn in_gusts(problem: &Problem, before: &Found) -> Result<Found, ReconstructError
 /// Gives rare errors of the sensors a wide prior where the data ask for it, and fits again after each one. The constants `held`
 /// keep their priors.
 fn free(problem: &mut Problem, found: &mut Found, held: &[usize]) -> Result<(), ReconstructError> {
-    while let Some((place, width)) = calibration::next(problem, found, BOUND, held) {
+    loop {
+        found.suspects = calibration::suspects(problem, found, BOUND, held);
+        let Some((place, width)) = calibration::next(problem, &found.suspects) else {
+            return Ok(());
+        };
         problem.widths[place] = width;
         found.widths = problem.widths;
         calm(problem, found, FIRST)?;
     }
-    Ok(())
 }
 
 /// `levels` of strong gusts with their most likely correlation time and level, beside white noise of the vanes. `found` is not changed.

@@ -8,6 +8,8 @@
 //! The reconstruction smooths the path in the rotated axes, which are those of gyros and attitude. Without vanes, α and β refer
 //! to these axes too. Vanes measure in the body axes. With vanes, the reconstruction attributes the mean effect of the
 //! misalignment on α and β to the vane biases. Apart from this mean, the reconstructed α and β follow the vanes.
+//! For a pitch or a yaw of the board they have hardly any other change. A roll changes α by −β ε and β by α ε. The vanes then
+//! contradict the board: the reconstruction estimates this roll (`board_roll`), and its α and β are those of the rotated axes.
 
 use crate::flight_path::reconstruction::{Instant, Reconstruction};
 
@@ -42,12 +44,14 @@ pub struct Turning {
     alpha: Option<[f64; 3]>,
     /// Mean change of β over the flight; `None` without a sideslip vane.
     beta: Option<[f64; 3]>,
+    /// Whether the reconstruction has estimated the roll of the board against the vanes. α and β then roll with the board.
+    rolled: bool,
 }
 
 impl Turning {
     /// Computes the changes for `flight`, with means over `segments`.
     pub fn of(flight: &Reconstruction, segments: &[Vec<Instant>]) -> Turning {
-        let vane = |name: &str| flight.nuisances.iter().any(|n| n.name == name);
+        let estimated = |name: &str| flight.nuisances.iter().any(|n| n.name == name);
         let mut sums = [[0.0; 3]; 2];
         for at in segments.iter().flatten() {
             for (axis, turned) in flow(at.state.alpha, at.state.beta).iter().enumerate() {
@@ -57,17 +61,21 @@ impl Turning {
         let count = segments.iter().map(Vec::len).sum::<usize>().max(1) as f64;
         let [alpha, beta] = sums.map(|of| of.map(|x| x / count));
         Turning {
-            alpha: vane("alpha_bias").then_some(alpha),
-            beta: vane("beta_bias").then_some(beta),
+            alpha: estimated("alpha_bias").then_some(alpha),
+            beta: estimated("beta_bias").then_some(beta),
+            rolled: estimated("board_roll"),
         }
     }
 
     /// Returns the changes at `alpha` and `beta` (rad). For a flow angle with a vane, this is the mean change over the flight.
-    /// For a flow angle without a vane, it is the change that [`flow`] returns.
+    /// For a flow angle without a vane, and for an estimated roll of the board, it is the change that [`flow`] returns.
     pub fn at(&self, alpha: f64, beta: f64) -> [[f64; 2]; 3] {
         let turned = flow(alpha, beta);
         std::array::from_fn(|axis| {
             let [alpha, beta] = turned[axis];
+            if axis == 0 && self.rolled {
+                return [alpha, beta];
+            }
             [self.alpha.map_or(alpha, |of| of[axis]), self.beta.map_or(beta, |of| of[axis])]
         })
     }
@@ -88,7 +96,26 @@ pub fn state(turning: &Turning, state: &[f64; 8]) -> [[f64; 8]; NAMES.len()] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flight_path::reconstruction::Nuisance;
     use nalgebra::{Rotation3, Vector3};
+
+    #[test]
+    fn flow_angles_roll_with_a_board_whose_roll_against_the_vanes_is_known() {
+        let constant = |name: &str| Nuisance {
+            name: name.into(),
+            value: 0.0,
+            sd: 0.001,
+            unit: "rad",
+            prior: None,
+        };
+        let mut flight = Reconstruction::empty("a");
+        flight.nuisances = ["alpha_bias", "beta_bias"].map(constant).to_vec();
+        // without a sample the mean change is zero
+        assert_eq!(Turning::of(&flight, &[]).at(0.2, -0.1), [[0.0; 2]; 3]);
+        flight.nuisances.push(constant("board_roll"));
+        let roll = flow(0.2, -0.1)[0];
+        assert_eq!(Turning::of(&flight, &[]).at(0.2, -0.1), [roll, [0.0; 2], [0.0; 2]]);
+    }
 
     /// The analytic changes must equal finite differences of rotation matrices.
     #[test]

@@ -7,7 +7,7 @@ use crate::flight_path::reconstruction::{Nuisance, Reconstruction};
 /// Kinds of estimated constants (sensor errors, wind), each with the prefix of its name, its identifier in the catalogue of
 /// effects and measurement errors, its nominal value, and the largest negligible deviation from that value, in the constant's
 /// unit. Errors of the reconstruction and usual trims cause deviations of this size.
-const KINDS: [(&str, &str, f64, f64); 15] = [
+const KINDS: [(&str, &str, f64, f64); 16] = [
     ("gyro_bias", "imu_bias", 0.0, 0.005),
     ("gyro_drift", "imu_bias", 0.0, 5e-5),
     ("accelerometer_bias", "imu_bias", 0.0, 0.1),
@@ -19,6 +19,7 @@ const KINDS: [(&str, &str, f64, f64); 15] = [
     ("accelerometer_gain", "imu_gain", 0.0, 0.01),
     ("airspeed_offset", "airspeed_offset", 0.0, 0.3),
     ("heading_offset", "heading_offset", 0.0, 0.026),
+    ("board_roll", "vanes_askew", 0.0, 0.0087),
     ("airspeed_scale", "airspeed_scale", 1.0, 0.01),
     ("wind_", "steady_wind", 0.0, 0.5),
     ("skew_actuators", "actuators_late", 0.0, 0.015),

@@ -95,6 +95,7 @@ mod tests {
             clock: ActuatorClock::AsRecorded,
             segments: vec![Segment { instants }],
             nuisances: Vec::new(),
+            installation: Vec::new(),
             noise: [0.0; 8],
             left: [0.0; 8],
             force_noise: [f64::NAN; 3],

@@ -6,6 +6,7 @@ use greylag_physics::airframe::ActuatorFigures;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::flight_path::{Options, reconstruct};
+use greylag_physics::sensors::Known;
 
 /// Time between samples, s.
 const STEP: f64 = 0.01;
@@ -72,4 +73,16 @@ fn gusts_are_not_taken_for_a_vane_gain_and_leave_its_noise_as_it_is() {
     // gusts of this flight have two components of three, which the common level does not know
     let change = 0.7 * (2.0 * STEP / 1.5_f64).sqrt();
     assert!((found.gust_step / change - 1.0).abs() < 0.35, "{} {change}", found.gust_step);
+}
+
+/// What calm flights say of a vane is kept in gusts, which would draw it to the gain that they feign.
+#[test]
+fn in_gusts_a_vane_keeps_the_gain_that_other_flights_show() {
+    let options = Options::new("rough", ActuatorFigures::tustin(30.0, 0.7, 0.4, 0.2, STEP));
+    let options = options.expecting(&[("beta_gain", Known { value: 0.08, sd: 0.01 })]);
+    let found = reconstruct(through_gusts(), &options).unwrap();
+    let gain = found.nuisances.iter().find(|n| n.name == "beta_gain").unwrap();
+    assert!((gain.value - 0.08).abs() < 1e-3 && gain.sd == 0.01, "{gain:?}");
+    let told = |name: &str| found.installation.iter().any(|e| e.name == name);
+    assert!(!told("beta_gain") && !told("alpha_gain") && !told("board_roll"));
 }

@@ -1,0 +1,222 @@
+//! Constants of the sensors' installation that all flights of an aircraft have in common: gains of vanes, gyros and
+//! accelerometers, and the roll of the board against the vanes.
+//!
+//! A flight with strong manoeuvres shows such an error significantly, and another flight does not. If each flight were
+//! reconstructed alone, the error would remain in the second one and look like an effect of the aircraft. The estimates of all flights are
+//! therefore combined, and the flights are reconstructed again with the result as prior. The combined value is the mean weighted
+//! by inverse variances. If the estimates scatter more than their standard deviations state, these are multiplied by the Birge
+//! ratio, the root of chi-square per degree of freedom (Birge 1932, Physical Review 40, 207). A flight's prior is what the other
+//! flights say, so that its own measurements count once.
+
+use crate::flight_path::Options;
+use crate::flight_path::reconstruction::Reconstruction;
+use greylag_physics::sensors::Known;
+
+/// A combined value is used if it exceeds this number of its standard deviations. One flight alone exceeds six, so that flights
+/// that agree reach it. Flights that contradict each other do not, because the Birge ratio widens the standard deviation.
+const CLEARLY: f64 = 4.0;
+/// Factor from a standard deviation to half of a 95 % interval.
+const INTERVAL: f64 = 1.96;
+
+/// Name of a constant, and its prior mean and standard deviation in the unit of
+/// [`CONSTANTS`](greylag_physics::sensors::CONSTANTS).
+pub type Prior = (&'static str, Known);
+
+/// Estimate of a constant of the installation from one flight alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// Name of the constant, for example `alpha_gain`.
+    pub name: &'static str,
+    /// Estimate, in the constant's unit.
+    pub value: f64,
+    /// Standard deviation, in the constant's unit.
+    pub sd: f64,
+    /// Whether the flight shows the constant significantly. Otherwise the flight alone is reconstructed without it.
+    pub shown: bool,
+}
+
+/// The constants of the installation that at least one flight of a set shows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Installation {
+    common: Vec<Common>,
+    contradicted: Vec<Contradicted>,
+}
+
+/// A constant with the estimates of the flights that determine it.
+#[derive(Clone, Debug, PartialEq)]
+struct Common {
+    name: &'static str,
+    /// Index of each flight, and its estimate. The standard deviations include the Birge ratio.
+    members: Vec<(usize, Estimate)>,
+    /// Mean of the estimates.
+    mean: Known,
+    /// Whether a flight of the set does not show the constant.
+    is_lacking: bool,
+}
+
+/// A constant for which the estimates of the flights do not agree.
+#[derive(Clone, Debug, PartialEq)]
+struct Contradicted {
+    name: &'static str,
+    /// Indices of the flights that show the constant.
+    shown: Vec<usize>,
+    chi_square: f64,
+    degrees: usize,
+}
+
+impl Installation {
+    /// Combines the estimates of a set of flights, one slice for each flight.
+    pub fn of(flights: &[&[Estimate]]) -> Installation {
+        let mut all = Installation::default();
+        let mut names: Vec<&'static str> = Vec::new();
+        for estimate in flights.iter().flat_map(|of| of.iter()).filter(|e| e.shown) {
+            if !names.contains(&estimate.name) {
+                names.push(estimate.name);
+            }
+        }
+        for name in names {
+            all.combine(name, flights);
+        }
+        all
+    }
+
+    /// Combines the estimates of the constant `name`.
+    fn combine(&mut self, name: &'static str, flights: &[&[Estimate]]) {
+        let of = |(k, own): (usize, &&[Estimate])| {
+            let own = own.iter().find(|e| e.name == name)?;
+            (own.value.is_finite() && own.sd.is_finite() && own.sd > 0.0).then_some((k, *own))
+        };
+        let mut members: Vec<(usize, Estimate)> =
+            flights.iter().enumerate().filter_map(of).collect();
+        let Some(mean) = weighted(members.iter().map(|(_, e)| e)) else { return };
+        let squares = members.iter().map(|(_, e)| ((e.value - mean.value) / e.sd).powi(2));
+        let (chi_square, degrees) = (squares.sum::<f64>(), members.len() - 1);
+        let birge = (chi_square / degrees.max(1) as f64).sqrt().max(1.0);
+        members.iter_mut().for_each(|(_, e)| e.sd *= birge);
+        let mean = Known { sd: mean.sd * birge, ..mean };
+        let shown: Vec<usize> = members.iter().filter(|(_, e)| e.shown).map(|(k, _)| *k).collect();
+        if mean.value.abs() > CLEARLY * mean.sd {
+            let is_lacking = shown.len() < flights.len();
+            self.common.push(Common { name, members, mean, is_lacking });
+        } else if birge > 1.0 {
+            self.contradicted.push(Contradicted { name, shown, chi_square, degrees });
+        }
+    }
+
+    /// Priors for a flight from the other flights of the set. `member` is the flight's index in the set, or `None` for a flight
+    /// outside the set. A constant that all flights of the set show is left to each of them.
+    pub fn priors(&self, member: Option<usize>) -> Vec<Prior> {
+        let of = |common: &Common| {
+            if member.is_some() && !common.is_lacking {
+                return None;
+            }
+            let others = common.members.iter().filter(|(k, _)| Some(*k) != member);
+            Some((common.name, weighted(others.map(|(_, e)| e))?))
+        };
+        self.common.iter().filter_map(of).collect()
+    }
+
+    /// A sentence for each constant that some flights show and others do not, and for each one on which they contradict each
+    /// other. `names` are the names of the flights of the set.
+    pub fn sentences(&self, names: &[&str]) -> Vec<String> {
+        let shared = self.common.iter().filter(|common| common.is_lacking).map(|common| {
+            let shown = common.members.iter().filter(|(_, e)| e.shown);
+            let shown = listed(names, shown.map(|(k, _)| *k));
+            format!(
+                "{}, as {shown} shows ({}); the other flights are reconstructed with it too.",
+                error(common.name, common.mean),
+                common.name,
+            )
+        });
+        let contradicted = self.contradicted.iter().map(|of| {
+            format!(
+                "{} is shown by {}, but the flights contradict each other (chi-square {:.1} with {} degrees of freedom): each \
+                 keeps its own estimate.",
+                of.name,
+                listed(names, of.shown.iter().copied()),
+                of.chi_square,
+                of.degrees,
+            )
+        });
+        shared.chain(contradicted).collect()
+    }
+}
+
+/// The names at the indices `places`, with commas between them.
+fn listed(names: &[&str], places: impl Iterator<Item = usize>) -> String {
+    let of: Vec<&str> = places.filter_map(|k| names.get(k).copied()).collect();
+    of.join(", ")
+}
+
+/// Mean weighted by inverse variances, with its standard deviation; `None` without an estimate.
+fn weighted<'a>(estimates: impl Iterator<Item = &'a Estimate>) -> Option<Known> {
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for estimate in estimates {
+        let weight = estimate.sd.powi(-2);
+        (sum, weights) = (sum + weight * estimate.value, weights + weight);
+    }
+    (weights > 0.0).then(|| Known { value: sum / weights, sd: weights.sqrt().recip() })
+}
+
+/// The error `known` of the constant `name`, with its 95 % interval, in words.
+fn error(name: &str, known: Known) -> String {
+    let [size, half] = [known.value.abs(), INTERVAL * known.sd];
+    if name == "board_roll" {
+        let side = if known.value > 0.0 { "right" } else { "left" };
+        let [size, half] = [size, half].map(f64::to_degrees);
+        return format!(
+            "The board is rolled to the {side} by {size:.2} ± {half:.2}° (95 %) against the vanes"
+        );
+    }
+    let [size, half] = [size, half].map(|x| 100.0 * x);
+    let much = if known.value > 0.0 { "much" } else { "little" };
+    format!("{} reads {size:.1} ± {half:.1} % (95 %) too {much}", instrument(name))
+}
+
+/// The instrument to which the gain `name` belongs, in words.
+fn instrument(name: &str) -> &'static str {
+    match name {
+        "alpha_gain" => "The angle-of-attack vane",
+        "beta_gain" => "The sideslip vane",
+        "gyro_gain_p" => "The roll gyro",
+        "gyro_gain_q" => "The pitch gyro",
+        "gyro_gain_r" => "The yaw gyro",
+        "accelerometer_gain_x" => "The forward accelerometer",
+        "accelerometer_gain_y" => "The rightward accelerometer",
+        _ => "The downward accelerometer",
+    }
+}
+
+/// Gives `flights`, the reconstructed flights of one aircraft, the constants of the installation that only some of them show.
+/// `again` reconstructs the flight with an index once more, with these priors. It is called at most once for each flight, and
+/// not at all if all flights show the same constants. Returns the constants.
+///
+/// # Errors
+/// The error of `again`.
+pub fn share<E>(
+    flights: &mut [Reconstruction],
+    mut again: impl FnMut(usize, &[Prior]) -> Result<Reconstruction, E>,
+) -> Result<Installation, E> {
+    let alone: Vec<&[Estimate]> = flights.iter().map(|f| f.installation.as_slice()).collect();
+    let installation = Installation::of(&alone);
+    for (k, flight) in flights.iter_mut().enumerate() {
+        let priors = installation.priors(Some(k));
+        if !priors.is_empty() {
+            *flight = again(k, &priors)?;
+        }
+    }
+    Ok(installation)
+}
+
+impl Options {
+    /// These options with priors that other flights of the aircraft give. What the aircraft's files state takes precedence.
+    pub fn expecting(mut self, priors: &[Prior]) -> Options {
+        for (name, known) in priors.iter().copied() {
+            self.sensors.expect(name, known);
+        }
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests;
