@@ -102,18 +102,18 @@ fn by_errors<const M: usize>(
 }
 
 /// Values of error-free sensors at sample `k`, by channel. The vanes are at the position `vanes_at` (m from the centre of
-/// gravity, body axes), and the board is rolled by `roll` (rad) against them.
+/// gravity, body axes), and the board is rolled by `board_roll` (rad) against them.
 fn shown(
     path: &Path,
     k: usize,
     rates: &[f64; 3],
     vanes_at: Option<[f64; 3]>,
-    roll: f64,
+    board_roll: f64,
 ) -> [f64; CHANNELS] {
     let [roll, pitch, yaw] = to_euler(&path.attitude[k]);
     let u = path.air_velocity(k);
     let at_vanes = vanes_at.map(|at| air_at(&u, &Vector3::from(*rates), at));
-    let [alpha, beta] = flow_angles(&unrolled(&at_vanes.unwrap_or(u), roll));
+    let [alpha, beta] = flow_angles(&unrolled(&at_vanes.unwrap_or(u), board_roll));
     let ground = path.velocity[k];
     [roll, pitch, yaw, u.norm(), alpha, beta, ground.x, ground.y, ground.z]
 }
