@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # MAVdataflash 3.0.0 (September 2025), logs of ArduPilot as data frames: two logs that are open at a time are one. The frames belong to the class, not to the object: each kind of record is read from the log that is asked first, and
 # is then the answer for both. before.GetData("ATT") and after.GetData("ATT") are the same flight; read and opened in turn both are right, until the first is asked again and answers with the second.
-# GetPARAM() and GetPARAMS(in_dict=True), which go another way, tell them apart; GetPARAMS(), with the same name, does not: of one log it gives 0.5 s and 0.35 s for the same gain.
+# GetPARAM(), which goes another way, tells them apart; GetPARAMS() does not: of the second log the one gives 0.35 s and the other 0.5 s for the same gain.
 # GetModes() names the modes of a copter, whatever flew: a plane's FBWA is LOITER, its ACRO GUIDED, its FBWB RTL, its GUIDED AUTOTUNE, and its AUTO and LOITER are UNKNOWN. What is in the log is a number; the message that names the vehicle is not read.
 # Why it matters: gains before and after a change, or a model on the flight it was not fitted to, are compared with themselves and agree to the last digit; a plane's manual flight passes for an automatic one.
 # The documentation begins with "Create a new instance". Instead: pymavlink's DFReader, which this package is built on; or one process for each log, and ModeNum.
