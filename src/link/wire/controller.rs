@@ -132,7 +132,7 @@ const AIR: f64 = 287.053;
 pub fn read(frame: &Frame<'_>) -> Option<ControllerMessage> {
     let fields = Fields(frame.payload);
     match frame.id {
-        // Decoded by byte offset, because rust-mavlink rejects enumeration values and flags that later releases of MAVLink added.
+        // Decoded by byte offset, because rust-mavlink rejects enumeration values that later releases of MAVLink added.
         0 => {
             return Some(ControllerMessage::Heartbeat {
                 autopilot: fields.u8(5),
@@ -149,14 +149,6 @@ pub fn read(frame: &Frame<'_>) -> Option<ControllerMessage> {
             let to = Source { system: fields.u8(8), component: fields.u8(9) };
             let (command, result) = (fields.u16(0), fields.u8(2));
             return Some(ControllerMessage::Ack { command, result, to });
-        }
-        105 => {
-            let float = |at: usize| f64::from(fields.f32(at));
-            return Some(ControllerMessage::Imu {
-                time: Time::from_micros(fields.u64(0)),
-                specific_force: [8, 12, 16].map(float),
-                density: density(float(44), float(56)),
-            });
         }
         436 => return Some(ControllerMessage::CurrentMode { custom_mode: fields.u32(0) }),
         253 => {
@@ -203,6 +195,11 @@ fn measured(message: MavMessage) -> Option<ControllerMessage> {
             boot_ms: m.time_boot_ms,
             quaternion: [m.q1, m.q2, m.q3, m.q4].map(wide),
             rates: [m.rollspeed, m.pitchspeed, m.yawspeed].map(wide),
+        },
+        MavMessage::HIGHRES_IMU(m) => ControllerMessage::Imu {
+            time: Time::from_micros(m.time_usec),
+            specific_force: [m.xacc, m.yacc, m.zacc].map(wide),
+            density: density(wide(m.abs_pressure), wide(m.temperature)),
         },
         MavMessage::VFR_HUD(m) => ControllerMessage::Air {
             airspeed: wide(m.airspeed),

@@ -87,9 +87,10 @@ const SERVOS: [&str; 16] = [
 ];
 
 /// Ids of the messages that rust-mavlink decodes.
-const READ: [u32; 13] = [
+const READ: [u32; 14] = [
     messages::ATTITUDE_QUATERNION_DATA::ID,
     messages::ATTITUDE_DATA::ID,
+    messages::HIGHRES_IMU_DATA::ID,
     messages::RAW_IMU_DATA::ID,
     messages::SCALED_IMU_DATA::ID,
     messages::SCALED_PRESSURE_DATA::ID,
@@ -107,11 +108,10 @@ const READ: [u32; 13] = [
 pub fn read(frame: &Frame<'_>) -> Option<Logged> {
     let fields = Fields(frame.payload);
     match frame.id {
-        // Decoded by byte offset, because rust-mavlink rejects enumeration values and flags that later releases of MAVLink added.
+        // Decoded by byte offset, because rust-mavlink rejects enumeration values that later releases of MAVLink added.
         messages::PARAM_VALUE_DATA::ID => Some(parameter(fields)),
         messages::HEARTBEAT_DATA::ID => Some(Logged::Values(heartbeat(fields))),
         messages::EXTENDED_SYS_STATE_DATA::ID => Some(Logged::Values(extended_state(fields))),
-        messages::HIGHRES_IMU_DATA::ID => Some(Logged::Values(highres_imu(fields))),
         // the id is checked before decoding, because most messages of a log are not used and decoding is slow
         id => READ.contains(&id).then(|| decode(frame)).flatten().and_then(logged),
     }
@@ -145,24 +145,6 @@ fn extended_state(fields: Fields<'_>) -> Values {
     )
 }
 
-fn highres_imu(fields: Fields<'_>) -> Values {
-    const FIELDS: [&str; 9] = [
-        "xacc",
-        "yacc",
-        "zacc",
-        "xgyro",
-        "ygyro",
-        "zgyro",
-        "abs_pressure",
-        "pressure_alt",
-        "temperature",
-    ];
-    // after the gyros the message has three fields of the magnetometer, and one of the differential pressure after the pressure
-    const OFFSETS: [usize; 9] = [8, 12, 16, 20, 24, 28, 44, 52, 56];
-    let numbers = OFFSETS.map(|offset| fields.f32(offset));
-    floats("HIGHRES_IMU", Own::Micros(fields.u64(0)), &FIELDS, &numbers)
-}
-
 fn logged(message: MavMessage) -> Option<Logged> {
     Some(Logged::Values(match message {
         MavMessage::ATTITUDE_QUATERNION(m) => floats(
@@ -176,6 +158,32 @@ fn logged(message: MavMessage) -> Option<Logged> {
             Own::BootMs(m.time_boot_ms),
             &["roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"],
             &[m.roll, m.pitch, m.yaw, m.rollspeed, m.pitchspeed, m.yawspeed],
+        ),
+        MavMessage::HIGHRES_IMU(m) => floats(
+            "HIGHRES_IMU",
+            Own::Micros(m.time_usec),
+            &[
+                "xacc",
+                "yacc",
+                "zacc",
+                "xgyro",
+                "ygyro",
+                "zgyro",
+                "abs_pressure",
+                "pressure_alt",
+                "temperature",
+            ],
+            &[
+                m.xacc,
+                m.yacc,
+                m.zacc,
+                m.xgyro,
+                m.ygyro,
+                m.zgyro,
+                m.abs_pressure,
+                m.pressure_alt,
+                m.temperature,
+            ],
         ),
         MavMessage::RAW_IMU(m) => values(
             "RAW_IMU",
@@ -325,26 +333,6 @@ mod tests {
 
     #[test]
     fn fields_read_by_offset_are_those_of_the_dialect() {
-        let imu = messages::HIGHRES_IMU_DATA {
-            time_usec: 1 << 40,
-            xacc: 1.0,
-            yacc: 2.0,
-            zacc: 3.0,
-            xgyro: 4.0,
-            ygyro: 5.0,
-            zgyro: 6.0,
-            xmag: 90.0,
-            ymag: 91.0,
-            zmag: 92.0,
-            abs_pressure: 7.0,
-            diff_pressure: 93.0,
-            pressure_alt: 8.0,
-            temperature: 9.0,
-            ..Default::default()
-        };
-        let read = of_message(&MavMessage::HIGHRES_IMU(imu));
-        assert_eq!((read.topic, read.own), ("HIGHRES_IMU", Own::Micros(1 << 40)));
-        assert_eq!(read.values[..9], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]);
         let state = messages::EXTENDED_SYS_STATE_DATA {
             vtol_state: messages::MavVtolState::MAV_VTOL_STATE_FW,
             landed_state: messages::MavLandedState::MAV_LANDED_STATE_IN_AIR,
@@ -357,13 +345,6 @@ mod tests {
     fn values_that_no_release_has_yet_are_read() {
         let heartbeat = of_payload(messages::HEARTBEAT_DATA::ID, &[7, 0, 0, 0, 240, 250, 0, 3, 3]);
         assert_eq!(numbers(heartbeat).values[..3], [240.0, 250.0, 7.0]);
-
-        let mut flags = [0; 63];
-        flags[60..62].copy_from_slice(&[0xFF, 0xFF]);
-        assert_eq!(
-            numbers(of_payload(messages::HIGHRES_IMU_DATA::ID, &flags)).topic,
-            "HIGHRES_IMU"
-        );
 
         let mut parameter = 1.5_f32.to_le_bytes().to_vec();
         parameter.extend([1, 0, 0, 0]);

@@ -115,7 +115,6 @@ pub fn read(frame: &Frame<'_>) -> Option<(Recipient, Request)> {
         40 | 51 => (at(2), mission(MissionStep::Item, fields.u8(4))),
         38 => (at(4), mission(MissionStep::Upload, fields.u8(6))),
         39 | 73 => (at(32), mission(MissionStep::Upload, fields.u8(37))),
-        82 => (at(36), Request::Attitude(setpoint::attitude(fields))),
         // SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT, SET_ACTUATOR_CONTROL_TARGET.
         84 => (at(50), Request::OtherSetpoint),
         86 => (at(50), Request::OtherSetpoint),
@@ -130,6 +129,9 @@ pub fn read(frame: &Frame<'_>) -> Option<(Recipient, Request)> {
 fn coded(message: MavMessage) -> Option<(Recipient, Request)> {
     let to = |system: u8, component: u8| Recipient { system, component };
     Some(match message {
+        MavMessage::SET_ATTITUDE_TARGET(m) => {
+            (to(m.target_system, m.target_component), Request::Attitude(setpoint::attitude(&m)))
+        }
         MavMessage::MANUAL_CONTROL(m) => (to(m.target, 0), Request::Sticks(setpoint::sticks(&m))),
         MavMessage::PARAM_REQUEST_LIST(m) => {
             (to(m.target_system, m.target_component), Request::ParameterList)

@@ -1,8 +1,7 @@
 //! Decoding and validation of attitude setpoints and stick positions from clients (ground stations and offboard programs).
 
-use mavlink::dialects::ardupilotmega::MANUAL_CONTROL_DATA;
+use mavlink::dialects::ardupilotmega::{MANUAL_CONTROL_DATA, SET_ATTITUDE_TARGET_DATA};
 
-use super::fields::Fields;
 use crate::autopilot::{AttitudeSetpoint, Sticks};
 
 /// Bit of the setpoint's type mask that marks the thrust as ignored.
@@ -27,18 +26,17 @@ pub enum SetpointFault {
     AttitudeMasked,
 }
 
-/// The commanded attitude of a SET_ATTITUDE_TARGET. Body rates and yaw are ignored, because a fixed-wing aircraft turns by
-/// banking. Bits of the type mask without a meaning in MAVLink are ignored too, as PX4 and ArduPilot do.
-pub(super) fn attitude(payload: Fields<'_>) -> Result<AttitudeSetpoint, SetpointFault> {
-    let mask = payload.u8(38);
+/// The commanded attitude. Body rates and yaw are ignored, because a fixed-wing aircraft turns by banking.
+pub(super) fn attitude(data: &SET_ATTITUDE_TARGET_DATA) -> Result<AttitudeSetpoint, SetpointFault> {
+    let mask = data.type_mask.bits();
     if mask & IGNORE_ATTITUDE != 0 {
         return Err(SetpointFault::AttitudeMasked);
     }
     let thrust = match mask & IGNORE_THRUST {
-        0 => Some(thrust(payload.f32(32))?),
+        0 => Some(thrust(data.thrust)?),
         _ => None,
     };
-    let (roll, pitch, _) = euler([4, 8, 12, 16].map(|at| f64::from(payload.f32(at))))?;
+    let (roll, pitch, _) = euler(data.q.map(f64::from))?;
     Ok(AttitudeSetpoint { roll, pitch, thrust })
 }
 
@@ -112,27 +110,6 @@ mod tests {
                 assert!((got - want).abs() < 1e-12, "{got} for {want}");
             }
         }
-    }
-
-    #[test]
-    fn the_fields_of_a_setpoint_are_those_of_the_dialect_and_spare_bits_of_its_mask_do_no_harm() {
-        use mavlink::dialects::ardupilotmega::{AttitudeTargetTypemask, SET_ATTITUDE_TARGET_DATA};
-        use mavlink::{MavlinkVersion, MessageData as _};
-        let q = quaternion([0.4, 0.1, 2.0]).map(|x| x as f32);
-        let type_mask = AttitudeTargetTypemask::ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE;
-        let data = SET_ATTITUDE_TARGET_DATA { q, thrust: 0.75, type_mask, ..Default::default() };
-        let mut payload = [0; 64];
-        data.ser(MavlinkVersion::V2, &mut payload);
-        for spare in [0, 8, 16] {
-            payload[38] |= spare;
-            let setpoint = attitude(Fields(&payload)).unwrap();
-            assert!((setpoint.roll - 0.4).abs() < 1e-6 && (setpoint.pitch - 0.1).abs() < 1e-6);
-            assert_eq!(setpoint.thrust, Some(0.75));
-        }
-        payload[38] |= IGNORE_THRUST;
-        assert_eq!(attitude(Fields(&payload)).unwrap().thrust, None);
-        payload[38] |= IGNORE_ATTITUDE;
-        assert_eq!(attitude(Fields(&payload)), Err(SetpointFault::AttitudeMasked));
     }
 
     #[test]
