@@ -40,7 +40,8 @@ class Bench:
         self.arguments, self.authority = arguments, authority
         self.room = arguments.out / f"{arguments.stack}-{authority}"
         self.room.mkdir(parents=True)
-        parameters = dict(word.split("=", 1) for word in arguments.parameter)
+        words = (word.split("=", 1) for word in arguments.parameter)
+        parameters = {name: float(value) for name, value in words}
         self.stack = STACKS[arguments.stack]()
         self.companion = self.client = None
         self.starts = 0

@@ -26,6 +26,8 @@ ARDUPLANE = {
     "SERVO1_FUNCTION": 4, "SERVO2_FUNCTION": 19, "SERVO3_FUNCTION": 70, "SERVO4_FUNCTION": 21, "SERVO3_TRIM": 1000,
     "ARSPD_TYPE": 100, "ARSPD_USE": 1, "ARSPD_PIN": 1,
     "TKOFF_ALT": 100, "TKOFF_LVL_ALT": 10, "TKOFF_THR_MINACC": 0, "TKOFF_THR_DELAY": 0,
+    # RTL keeps its height: the descent to 100 m that it is shipped with would count as height lost.
+    "RTL_ALTITUDE": -1,
     "ARMING_SKIPCHK": -1, "ARMING_CHECK": 0, "LOG_DISARMED": 0, "LOG_BITMASK": 65535,
 }  # fmt: skip
 

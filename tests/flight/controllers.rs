@@ -27,8 +27,7 @@ fn ready(personality: Personality, authority: Authority) -> Bench {
 fn an_attitude_is_held_through_every_stack() {
     // The bounds of issue 8: 0.3° through PX4's sticks at 100 Hz, 0.6° through ArduPilot's channels
     // at 50 Hz. When a controller of its own tracks the attitude, its loops stay off, as real ones do: 0.3° with
-    // the companion's slow trim (issue 30). ArduPlane's begin anew at each change of mode and take longer; the real
-    // one was off by 0.55° after 12 s. The hard corner is shown only.
+    // the companion's slow trim (issue 30) and what it adds for ArduPlane. The hard corner is shown only.
     for (personality, authority, seconds, bound) in [
         (Px4, Surfaces, 14.0, 0.3),
         (Ardupilot, Surfaces, 14.0, 0.6),

@@ -6,6 +6,7 @@
 //! authority.
 
 pub mod air_data;
+mod arduplane_lead;
 mod assembly;
 mod attitude_ramp;
 mod attitude_trim;
@@ -30,6 +31,7 @@ use crate::autopilot::Severity;
 use crate::framing::{FrameCounts, Source, Version};
 use crate::peer::PeerId;
 use crate::wire::{Message, controller as wire};
+use arduplane_lead::ArduplaneLead;
 use assembly::Assembly;
 use attitude_ramp::AttitudeRamp;
 use attitude_trim::AttitudeTrim;
@@ -91,6 +93,7 @@ pub struct Real {
     sticks: Sticks,
     ramp: AttitudeRamp,
     trim: AttitudeTrim,
+    lead: ArduplaneLead,
     /// The last finite command that the companion demanded, −1..1 (throttle 0..1).
     sent: Command,
     /// Host time of the last state frame.
@@ -126,6 +129,7 @@ impl Real {
             sticks: Sticks::default(),
             ramp: AttitudeRamp::default(),
             trim: AttitudeTrim::default(),
+            lead: ArduplaneLead::default(),
             sent: Command::IDLE,
             last_state: None,
             pulse: Pulse::default(),
@@ -160,6 +164,7 @@ impl Real {
             self.engagement.rest();
             self.ramp.rest();
             self.trim.rest();
+            self.lead.rest();
             return Vec::new();
         };
         if let Some(fault) = demand.fault.filter(|_| self.engagement.steers()) {
@@ -203,17 +208,26 @@ impl Real {
     }
 
     /// The roll and pitch (rad) that are sent for the demanded ones, `wanted`: limited in rate, and with an integral correction
-    /// while the controller executes them.
+    /// while the controller executes them. ArduPlane also receives what its loops leave out.
     fn commanded(&mut self, time: Time, wanted: [f64; 2]) -> [f64; 2] {
         let seen = self.assembly.attitude();
         if !self.flies() {
             // until the controller executes attitude setpoints, the measured attitude is sent
             self.ramp.rest();
             self.trim.rest();
+            self.lead.rest();
             return self.ramp.command(time, wanted, seen);
         }
         let on_the_way = self.ramp.command(time, wanted, seen);
-        self.trim.command(time, on_the_way, seen)
+        let trimmed = self.trim.command(time, on_the_way, seen);
+        match self.profile.stack {
+            Stack::Px4 => trimmed,
+            Stack::Ardupilot => {
+                let airspeed = self.assembly.airspeed();
+                let added = self.lead.command(time, on_the_way, seen, airspeed);
+                std::array::from_fn(|axis| trimmed[axis] + added[axis])
+            }
+        }
     }
 
     /// Removes and returns the oldest notice.

@@ -1,9 +1,9 @@
 //! The attitude loops of a flight stack, and its airspeed and altitude loops for the autonomous modes.
 //!
 //! Both stacks have the same structure. The attitude error gives a commanded rate, to which the rate of a coordinated turn is
-//! added. The rate error, its integral and the commanded rate (feed-forward) give the deflection. The deflection is scaled down
-//! with increasing airspeed. Sources: `FixedwingAttitudeControl` and `FixedwingRateControl` of PX4, August 2025;
-//! `AP_RollController` and `AP_PitchController` of ArduPlane 4.8.
+//! added; ArduPlane adds it about the pitch axis alone. The rate error, its integral and the commanded rate (feed-forward) give
+//! the deflection. The deflection is scaled down with increasing airspeed. Sources: `FixedwingAttitudeControl` and
+//! `FixedwingRateControl` of PX4, August 2025; `AP_RollController` and `AP_PitchController` of ArduPlane 4.8.
 
 use super::Personality;
 use crate::plant::{DT_S, Inputs, Travel, Truth};
@@ -40,6 +40,15 @@ struct Gains {
     forward: f64,
 }
 
+/// Body rates of a coordinated turn that a stack adds to its commanded rates.
+#[derive(Clone, Copy, Debug)]
+enum Turns {
+    /// About the roll and the pitch axis: PX4.
+    BothAxes,
+    /// About the pitch axis alone: `AP_RollController` of ArduPlane adds none.
+    PitchAlone,
+}
+
 /// Gains of the control law that correspond to a stack's parameters for an aircraft like the X8.
 #[derive(Clone, Copy, Debug)]
 struct Stack {
@@ -52,6 +61,7 @@ struct Stack {
     /// Airspeed for which the gains are tuned, and the lowest airspeed of the gain scaling, m/s.
     scaled_at_mps: f64,
     least_mps: f64,
+    turns: Turns,
 }
 
 /// PX4's airframe 1036 with the airspeeds of the X8, as in the ULog of the flight that the test below replays.
@@ -64,6 +74,7 @@ const PX4: Stack = Stack {
     cutoff_hz: f64::INFINITY,
     scaled_at_mps: 18.0,
     least_mps: 11.0,
+    turns: Turns::BothAxes,
 };
 
 /// ArduPlane's gains for the X8, as in the log of the flight that the test below replays.
@@ -91,6 +102,7 @@ const ARDUPILOT: Stack = Stack {
     cutoff_hz: 3.0,
     scaled_at_mps: 15.0,
     least_mps: 7.5,
+    turns: Turns::PitchAlone,
 };
 
 /// The control loops with their states.
@@ -121,7 +133,8 @@ impl Law {
     }
 
     /// Resets the airspeed and altitude loops for a new mode, and with `forgets` also the integrators of the rate loops.
-    /// ArduPlane resets these integrators at every mode change, PX4 only after a mode without rate control.
+    /// PX4 and ArduPlane reset these integrators after a mode without rate control alone: real ArduPlane 4.8 went from LOITER to
+    /// GUIDED with the integrators that it had.
     pub(super) fn begin(&mut self, forgets: bool) {
         (self.slow, self.altitude) = (0.0, None);
         if forgets {
@@ -178,8 +191,14 @@ impl Law {
         let pitch_rate = (pitch - up) / of_pitch.time_constant_s;
         let airspeed = seen.airspeed_mps.max(self.stack.least_mps);
         let turn = now.clamp(-COORDINATED, COORDINATED).tan() * up.cos() * GRAVITY / airspeed;
-        let p = roll_rate - up.sin() * turn;
-        let q = now.cos() * pitch_rate + up.cos() * now.sin() * turn;
+        let [p, q] = match self.stack.turns {
+            Turns::BothAxes => [
+                roll_rate - up.sin() * turn,
+                now.cos() * pitch_rate + up.cos() * now.sin() * turn,
+            ],
+            // without the body roll rate of a climbing turn, which stays as a roll error
+            Turns::PitchAlone => [roll_rate, pitch_rate + now.sin() * turn],
+        };
         [p.clamp(-of_roll.most, of_roll.most), q.clamp(-of_pitch.most, of_pitch.most)]
     }
 

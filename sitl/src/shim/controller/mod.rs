@@ -289,8 +289,7 @@ impl FlightController {
     /// Changes the mode as a pilot would.
     pub fn set_mode(&mut self, mode: Mode) {
         if self.mode != mode {
-            let manual = self.mode == Mode::Manual;
-            self.law.begin(manual || self.personality == Personality::Ardupilot);
+            self.law.begin(self.mode == Mode::Manual);
             (self.mode, self.entered_us) = (mode, self.now_us);
             let heartbeat = self.heartbeat();
             self.encoder.encode(&heartbeat, &mut self.waiting);

@@ -89,6 +89,11 @@ impl Assembly {
         }
     }
 
+    /// True airspeed of the last state, m/s.
+    pub(super) fn airspeed(&self) -> f64 {
+        self.last.state.airspeed
+    }
+
     /// Stores the measurement in `message`. An attitude completes a state, which is returned. `command` acted since the last one.
     pub(super) fn take(
         &mut self,
