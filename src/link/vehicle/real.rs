@@ -223,7 +223,7 @@ impl Real {
         match self.profile.stack {
             Stack::Px4 => trimmed,
             Stack::Ardupilot => {
-                let airspeed = self.assembly.airspeed();
+                let airspeed = self.assembly.last.state.airspeed;
                 let added = self.lead.command(time, on_the_way, seen, airspeed);
                 std::array::from_fn(|axis| trimmed[axis] + added[axis])
             }

@@ -38,7 +38,7 @@ pub(super) struct Assembly {
     new_velocity: bool,
     actuators: Actuators,
     boot_ms: Option<u32>,
-    last: Telemetry,
+    pub(super) last: Telemetry,
     /// Assumed standard deviation of the reported wind, m/s.
     wind_sd: f64,
     /// Bit patterns of the last state's sensor values, to detect frozen sensors.
@@ -87,11 +87,6 @@ impl Assembly {
             true => [f64::NAN; 2],
             false => [self.last.state.roll, self.last.state.pitch],
         }
-    }
-
-    /// True airspeed of the last state, m/s.
-    pub(super) fn airspeed(&self) -> f64 {
-        self.last.state.airspeed
     }
 
     /// Stores the measurement in `message`. An attitude completes a state, which is returned. `command` acted since the last one.
