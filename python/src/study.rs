@@ -11,7 +11,7 @@ use greylag::model::GreyBox;
 use greylag::physics::catalogue;
 use greylag::sysid;
 use greylag::sysid::amend::{Added, Amended, Prior, Refused, document};
-use greylag::sysid::flight_path::installation::{Prior, share};
+use greylag::sysid::flight_path::installation::{Prior as Expected, share};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
 use greylag::sysid::progress::{Progress, Stage};
@@ -71,14 +71,14 @@ impl Reading {
         &self,
         paths: &[PathBuf],
         (model, clock): (&GreyBox, ActuatorClock),
-        installation: &mut Vec<Prior>,
+        installation: &mut Vec<Expected>,
         notes: &mut Vec<String>,
         progress: &Progress,
     ) -> Result<Vec<Reconstruction>, String> {
         let mut flights = Vec::new();
         let known = installation.clone();
         let names: Vec<String> = paths.iter().map(|path| name_of(path)).collect();
-        let one = |log: Log, k: usize, priors: &[Prior]| {
+        let one = |log: Log, k: usize, priors: &[Expected]| {
             let options = flight_path::Options::of(&names[k], model, clock);
             let options = options.expecting(&known).expecting(priors);
             let cannot = |e| format!("cannot use flight log {}: {e}", paths[k].display());
@@ -213,7 +213,7 @@ pub fn amend(
         let hashes = [hashed(&logs)?, hashed(&hold_out)?];
         let clock = ActuatorClock::AsRecorded;
         let mut notes = Vec::new();
-        let (aircraft, mut installation) = ((&model, clock), Vec::new());
+        let (aircraft, mut installation) = ((&*model, clock), Vec::new());
         let mut flights =
             reading.flights(&logs, aircraft, &mut installation, &mut notes, progress)?;
         let mut tests =

@@ -11,8 +11,12 @@
 //! For a pitch or a yaw of the board they have hardly any other change. A roll changes α by −β ε and β by α ε. The vanes then
 //! contradict the board: the reconstruction estimates this roll (`board_roll`), and its α and β are those of the rotated axes.
 
+use greylag_physics::State;
+
 use crate::flight_path::reconstruction::{Instant, Reconstruction};
 
+/// Number of steps in which [`turn_back`] rotates. An angle of 3° is then exact to 0.01°.
+const STEPS: usize = 8;
 /// Identifier of the misalignment in the list of measurement errors.
 pub const ID: &str = "axes_askew";
 /// Names of the angles, about body x, y and z.
@@ -93,10 +97,26 @@ pub fn state(turning: &Turning, state: &[f64; 8]) -> [[f64; 8]; NAMES.len()] {
     })
 }
 
+/// Rotates the measurements `at` back by the misalignment `angles` (rad about each body axis). `turning` gives the changes of α and
+/// β. The angles are not small here: the change is made in steps.
+pub fn turn_back(turning: &Turning, angles: &[f64; NAMES.len()], at: &mut Instant) {
+    for _ in 0..STEPS {
+        let mut now = at.state.to_array();
+        let (states, forces) = (state(turning, &now), vector(at.specific_force));
+        for (angle, (state, force)) in angles.iter().zip(states.iter().zip(&forces)) {
+            let angle = angle / STEPS as f64;
+            now.iter_mut().zip(state).for_each(|(x, by)| *x -= angle * by);
+            at.specific_force.iter_mut().zip(force).for_each(|(f, by)| *f -= angle * by);
+        }
+        at.state = State::from_array(now);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::flight_path::reconstruction::Nuisance;
+    use greylag_physics::Controls;
     use nalgebra::{Rotation3, Vector3};
 
     #[test]
@@ -115,6 +135,36 @@ mod tests {
         flight.nuisances.push(constant("board_roll"));
         let roll = flow(0.2, -0.1)[0];
         assert_eq!(Turning::of(&flight, &[]).at(0.2, -0.1), [roll, [0.0; 2], [0.0; 2]]);
+    }
+
+    #[test]
+    fn an_angle_that_is_not_small_is_turned_back() {
+        let right = |angles: [f64; 3]| {
+            let board = Rotation3::new(Vector3::from(angles)).inverse();
+            let turned = |x: [f64; 3]| board * Vector3::from(x);
+            let (rates, force) = (turned([1.0, -0.5, 0.3]), turned([0.5, -1.0, -12.0]));
+            let wind = turned([20.0 * 0.2_f64.cos(), 0.0, 20.0 * 0.2_f64.sin()]);
+            let (alpha, beta) = (wind.z.atan2(wind.x), (wind.y / 20.0).asin());
+            let [p, q, r] = rates.into();
+            let mut at = Instant {
+                time_s: 0.0,
+                state: State { alpha, beta, p, q, r, ..State::NEUTRAL },
+                yaw: 0.0,
+                controls: Controls::default(),
+                command: None,
+                specific_force: force.into(),
+                altitude: 0.0,
+                density: 1.2,
+            };
+            turn_back(&Turning::default(), &angles, &mut at);
+            at
+        };
+        let (straight, back) = (right([0.0; 3]), right([0.02, 0.044, -0.03]));
+        let pairs = straight.specific_force.iter().zip(&back.specific_force);
+        assert!(pairs.map(|(a, b)| (a - b).abs()).all(|off| off < 0.01), "{back:?}");
+        let states = straight.state.to_array().into_iter().zip(back.state.to_array());
+        // roll and pitch have no rotation here
+        assert!(states.skip(2).all(|(a, b)| (a - b).abs() < 5e-4), "{back:?}");
     }
 
     /// The analytic changes must equal finite differences of rotation matrices.

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use std::f64::consts::{PI, TAU};
 
 use crate::flight_path::reconstruction::{Instant, Reconstruction};
-use crate::per_flight::askew::Turning;
+use crate::per_flight::askew::{self, Turning};
 use crate::weak_form::channels::RegimeVariable;
 use crate::weak_form::kernel::{Kernel, weigh};
 use greylag_logs::Sampling;
@@ -46,6 +46,8 @@ pub struct Prepared {
     pub force_noise: [f64; 3],
     /// Mean changes of α and β over the flight, per rad of misalignment of the sensor axes.
     pub turning: Turning,
+    /// Misalignment by which the axes were rotated back ([`Self::turned_back`]), rad about each body axis.
+    pub turned: [f64; askew::NAMES.len()],
     /// Kernel sampled at the interval `dt`.
     pub kernel: Kernel,
     /// Windows in time order.
@@ -100,9 +102,19 @@ impl Prepared {
             noise,
             force_noise,
             turning,
+            turned: [0.0; askew::NAMES.len()],
             kernel,
             windows,
         })
+    }
+
+    /// The flight with its axes rotated back by the misalignment `angles`, rad about each body axis.
+    pub fn turned_back(&self, angles: &[f64; askew::NAMES.len()]) -> Prepared {
+        let mut right = self.clone();
+        let all = right.segments.iter_mut().flatten();
+        all.for_each(|at| askew::turn_back(&self.turning, angles, at));
+        right.turned = std::array::from_fn(|axis| self.turned[axis] + angles[axis]);
+        right
     }
 
     /// The flight with every other sample.
@@ -119,6 +131,7 @@ impl Prepared {
             noise: self.noise,
             force_noise: self.force_noise,
             turning: self.turning,
+            turned: self.turned,
             windows: windows(&segments, &kernel, origin),
             segments,
             kernel,

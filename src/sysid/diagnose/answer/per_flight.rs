@@ -28,6 +28,19 @@ const LEAST: f64 = 0.15 * std::f64::consts::PI / 180.0;
 /// deviation.
 const MATTERS: f64 = 0.2;
 
+/// Estimated misalignment angles of each flight in `round`, rad, beyond those by which its axes were already rotated back. Zeros
+/// unless they were estimated.
+pub fn further_angles(round: &Round) -> Vec<[f64; askew::NAMES.len()]> {
+    let (first, count) = (round.coefficients.len(), round.per_flight.constants().len());
+    let angles = round.per_flight.angles();
+    let angle = |flight: usize, axis: usize| match axis < angles {
+        true => round.projected.tuned[first + flight * count + axis],
+        false => 0.0,
+    };
+    let of = |flight: usize| std::array::from_fn(|axis| angle(flight, axis));
+    (0..round.flights.len()).map(of).collect()
+}
+
 /// Misalignment angles of each flight in `round`; empty unless they were estimated.
 pub fn angles(round: &Round) -> Vec<Measurement> {
     let angles = round.per_flight.angles();
@@ -107,7 +120,10 @@ fn fitted(round: &Round) -> Vec<Fitted> {
         return Vec::new();
     }
     let robust = sandwich(round);
+    let angles = round.per_flight.angles();
     let one = |flight: usize, which: usize| {
+        let measured = &round.flights[flight].measured;
+        let turned = if which < angles { measured.turned[which] } else { 0.0 };
         let misfit = misfit(round, flight);
         let places: Vec<usize> = (0..flights).map(|k| place(k, which)).collect();
         let own = places[flight];
@@ -124,10 +140,10 @@ fn fitted(round: &Round) -> Vec<Fitted> {
         };
         let sd = |white: f64, robust: f64| (misfit * misfit * white).max(robust).max(0.0).sqrt();
         Fitted {
-            flight: round.flights[flight].measured.name.clone(),
+            flight: measured.name.clone(),
             which,
             constant: constants[which],
-            value: p.tuned[own],
+            value: turned + p.tuned[own],
             sd: sd(p.covariance[(own, own)], robust[(own, own)]),
             beside_mean: (flights > 1).then(|| [beside, sd(of(&p.covariance), of(&robust))]),
         }

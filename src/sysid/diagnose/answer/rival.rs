@@ -7,6 +7,7 @@
 //! search is repeated with free misalignment angles. The Bayesian information criterion compares both explanations under the same
 //! noise: their residuals and their numbers of constants.
 
+use crate::diagnose::answer::per_flight::further_angles;
 use crate::diagnose::answer::result::Verdict;
 use crate::diagnose::answer::run::verdict;
 use crate::diagnose::error::DiagnoseError;
@@ -26,6 +27,11 @@ const MOUNTED_DEG: f64 = 3.0;
 /// the board's angles may explain a weaker one.
 const WORTH: f64 = 0.3;
 
+/// Largest misalignment for which a regression that is linear in the angles suffices, rad.
+const LINEAR: f64 = std::f64::consts::PI / 180.0;
+/// Largest number of searches with axes that are rotated back.
+const AGAIN: usize = 2;
+
 /// Returns the better explanation of the flights of `problem`: `found`, or a search result with misaligned axes. If
 /// both are equally good, the effects of `found` are marked as indistinguishable from misaligned axes.
 ///
@@ -40,8 +46,18 @@ pub fn against_axes(
 ) -> Result<Found, DiagnoseError> {
     let Some(tilted) = worth(&problem, &found) else { return Ok(found) };
     report(progress, "explaining the flights by misaligned axes", 0.9)?;
-    let other = search(&tilted, model, options, &part(progress, [0.9, 0.95]))?;
     let cost = |problem: &Problem, of: &Found| cost(problem, &found, of);
+    let mut tilted = tilted;
+    let mut other = search(&tilted, model, options, &part(progress, [0.9, 0.93]))?;
+    for _ in 0..AGAIN {
+        let Some(next) = turned_back(&tilted, &other) else { break };
+        let again = search(&next, model, options, &part(progress, [0.93, 0.95]))?;
+        let better = matches!((cost(&tilted, &other), cost(&next, &again)), (Some(now), Some(then)) if then < now);
+        if !better {
+            break;
+        }
+        (tilted, other) = (next, again);
+    }
     let (Some(effects), Some(axes)) = (cost(&problem, &found), cost(&tilted, &other)) else {
         return Ok(found);
     };
@@ -54,6 +70,20 @@ pub fn against_axes(
         }
     }
     Ok(found)
+}
+
+/// The problem with its axes rotated back by the angles in `found`. `None` if these are small or the model is adequate with them.
+///
+/// The regression is linear in the angles. Beyond a degree or two the aerodynamics is not: the lift of an aircraft near its stall
+/// changes within that.
+fn turned_back(problem: &Problem, found: &Found) -> Option<Problem> {
+    let angles = further_angles(found.round());
+    let large = angles.iter().flatten().any(|angle| angle.abs() > LINEAR);
+    (large && verdict(found) != Verdict::Adequate).then(|| {
+        let pairs = problem.flights.iter().zip(&angles);
+        let flights = pairs.map(|(flight, angles)| flight.turned_back(angles)).collect();
+        Problem { flights, ..problem.clone() }
+    })
 }
 
 /// Returns the problem with free misalignment angles. `None` if the angles are free already, if no effect is missing,
