@@ -3,6 +3,7 @@
 //! "Level trim" stands for [`Trim::straight`] with level wings. At airspeeds for which a throttle between idle and full
 //! suffices, it is level flight. At other airspeeds it is a descent at idle or full throttle.
 
+use super::lift::LiftCurve;
 use super::polarity::Answers;
 use greylag_model::{GreyBox, Trim, TrimError};
 use greylag_physics::airframe::Envelope;
@@ -35,6 +36,8 @@ pub struct Config {
     /// Modelled responses to the surfaces, for the check that the surfaces act in the expected direction. `None` omits the
     /// check.
     pub answers: Option<Answers>,
+    /// Lift of the model, from which the angle of attack for control follows where no vane measures it. `None` without a model.
+    pub lift: Option<LiftCurve>,
 }
 
 /// Source of the throttle in OFFBOARD (parameter GL_THRUST_SRC).
@@ -76,6 +79,7 @@ impl Config {
         let speeds = (0..=count).map(|i| envelope.airspeed_min_mps + i as f64 * TRIM_SPACING);
         let mut config = Config::new(envelope, speeds.filter_map(|v| row(v).ok()).collect());
         config.answers = Some(Answers::of(model, envelope.airspeed_cruise_mps)?);
+        config.lift = LiftCurve::of(model, envelope.airspeed_cruise_mps)?;
         config.check()?;
         Ok(config)
     }
@@ -97,6 +101,7 @@ impl Config {
             disarm_airspeed_max_mps: 8.0,
             trim,
             answers: None,
+            lift: None,
         }
     }
 }

@@ -3,9 +3,10 @@
 
 use std::time::Duration;
 
+use super::lift::{ByLift, LiftCurve};
 use super::telemetry::{defect, repeats};
 use greylag_link::vehicle::Telemetry;
-use greylag_physics::Time;
+use greylag_physics::{State, Time};
 
 /// Largest step back of vehicle time that does not count as a restart of the vehicle. Reordered frames step back by one
 /// or two cycles only.
@@ -33,11 +34,19 @@ pub(super) struct Estimate {
     usable_at: Option<Time>,
     fresh_at: Option<Time>,
     frozen: bool,
+    by_lift: ByLift,
+    /// Angle of attack for control in `last`, rad.
+    alpha: f64,
 }
 
 impl Estimate {
-    /// Registers a frame that arrived at `now`, and returns its usability.
-    pub(super) fn take(&mut self, now: Time, frame: &Telemetry) -> Frame {
+    /// Registers a frame that arrived at `now`, and returns its usability. `curve` is the lift of the model.
+    pub(super) fn take(
+        &mut self,
+        now: Time,
+        frame: &Telemetry,
+        curve: Option<&LiftCurve>,
+    ) -> Frame {
         if self.newest.is_some_and(|newest| frame.time <= newest) {
             return Frame::Repeated;
         }
@@ -48,6 +57,7 @@ impl Estimate {
         let frozen = self.last.is_some_and(|last| repeats(frame, &last));
         self.frozen = frozen;
         self.last = Some(*frame);
+        self.alpha = self.by_lift.alpha(curve, frame);
         self.usable_at = Some(now);
         if frozen {
             return Frame::Frozen;
@@ -82,6 +92,12 @@ impl Estimate {
 
     pub(super) fn last(&self) -> Option<&Telemetry> {
         self.last.as_ref()
+    }
+
+    /// The last frame, with the angle of attack for control ([`ByLift`]).
+    pub(super) fn for_control(&self) -> Option<Telemetry> {
+        let with = |last: Telemetry| State { alpha: self.alpha, ..last.state };
+        self.last.map(|last| Telemetry { state: with(last), ..last })
     }
 
     /// Whether a usable state arrived within `limit_s` before `now`.

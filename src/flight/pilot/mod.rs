@@ -15,6 +15,7 @@ mod decision;
 mod envelope;
 mod estimate;
 mod failsafe;
+mod lift;
 mod limits;
 mod model_watch;
 mod modes;
@@ -29,6 +30,7 @@ mod wish;
 
 pub use config::{Config, ConfigError, ThrustSource, TrimPoint};
 pub use decision::{Decision, Plan, Request, Source};
+pub use lift::LiftCurve;
 pub use limits::{Limits, TICK_S};
 pub use modes::mode_name;
 pub use polarity::Answers;
@@ -64,8 +66,7 @@ const SWINGS_AGAIN_S: f64 = 20.0;
 ///   [`Autopilot`](greylag_link::autopilot::Autopilot), between two ticks;
 /// - vehicle: [`Pilot::engaged`] when a flight controller, not the simulator's MAVLink side, has given control authority.
 ///
-/// All times are vehicle time and must not decrease. A clock that jumps back by more than 1 s counts as a restart of
-/// the vehicle; the pilot then drops all earlier states.
+/// All times are vehicle time and must not decrease. After a jump back by more than 1 s the pilot drops all earlier states.
 pub struct Pilot {
     config: Config,
     limits: Limits,
@@ -231,8 +232,7 @@ impl Pilot {
         }
     }
 
-    /// Advances time to `now` and checks the timeouts of setpoints, sticks and vehicle. It must also be called while no
-    /// frames arrive. A clock that jumps back by more than 1 s counts as a restart of the vehicle.
+    /// Advances time to `now` and checks the timeouts. It must also be called while no frames arrive.
     pub fn advance(&mut self, now: Time) {
         if self.clock.since(now) > RESTART {
             self.restart();
@@ -249,7 +249,7 @@ impl Pilot {
             self.restart();
         }
         self.advance(now);
-        let quality = self.estimate.take(now, frame);
+        let quality = self.estimate.take(now, frame, self.config.lift.as_ref());
         self.excuse_stillness(quality, now);
         self.answering = frame.time;
         self.watch_return();
@@ -376,7 +376,7 @@ impl Pilot {
             return Pending::Sticks(sticks);
         }
         let usable = matches!(quality, Frame::Usable | Frame::Frozen) && !self.vehicle_lost;
-        let Some(frame) = self.estimate.last().copied().filter(|_| usable) else {
+        let Some(frame) = self.estimate.for_control().filter(|_| usable) else {
             self.target = self.level_target();
             return Pending::Unusable;
         };

@@ -1,0 +1,195 @@
+//! Angle of attack for control where no vane measures it: the link's estimate, corrected by the measured lift.
+//!
+//! The link estimates the angle of attack from attitude and climb rate. Air that rises by 1 m/s then counts as 3° at 20 m/s.
+//! Beside ArduPlane in light turbulence the error reached 12°, and the elevator that answered it pitched the aircraft up by 60°.
+//! The accelerometer shows the lift, whatever the air does, and the model states at which angle of attack the wing has it. If the
+//! model's lift is wrong by 10 %, the angle is wrong by 0.7° in level flight of the X8. Records, the monitor and diagnoses keep the
+//! link's estimate, because an angle from the model's lift would agree with this lift.
+
+use greylag_link::vehicle::{Faults, Telemetry, VANE_SD};
+use greylag_model::{GreyBox, Trim, TrimError, Twin};
+use greylag_physics::atmosphere::standard_density;
+use greylag_physics::{State, Time};
+
+/// First angle of attack of the lift curve, spacing of its points, and their number.
+const FIRST_DEG: f64 = -10.0;
+const SPACING_DEG: f64 = 1.0;
+const COUNT: usize = 31;
+/// Elevator deflection from which its lift is computed, rad.
+const ELEVATOR: f64 = 0.1;
+/// Time constant with which the lift corrects the estimate, s. It is short against a gust, and long against the vibration that an
+/// accelerometer measures.
+const TIME_S: f64 = 0.15;
+/// Time constant with which a correction is forgotten without an accelerometer, s.
+const FORGOTTEN_S: f64 = 2.0;
+/// Time between two states above which the correction restarts, s.
+const GAP_S: f64 = 0.5;
+/// Largest correction, rad.
+const MOST: f64 = 15.0 * DEGREE;
+/// Lowest airspeed at which the lift is used, m/s.
+const SLOWEST_MPS: f64 = 5.0;
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+/// Lift of a model in straight flight: upward specific force by dynamic pressure (m/s² per Pa) over the angle of attack.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LiftCurve {
+    /// Values that rise with the angle of attack, at `from` and then every [`SPACING_DEG`].
+    rising: Vec<f64>,
+    /// Angle of attack of the first value, rad.
+    from: f64,
+    /// Change per rad of elevator, from its deflection `trim` (rad) on.
+    by_elevator: f64,
+    trim: f64,
+}
+
+impl LiftCurve {
+    /// The curve of `model` at the true airspeed `airspeed` (m/s). `None` if its lift does not rise over five degrees.
+    ///
+    /// # Errors
+    /// If the model has no straight-flight trim at `airspeed`.
+    pub fn of(model: &GreyBox, airspeed: f64) -> Result<Option<LiftCurve>, TrimError> {
+        let altitude = model.airframe.reference.altitude;
+        let trim = Trim::straight(model, airspeed, altitude)?;
+        let pressure = 0.5 * model.atmosphere.density_at(altitude) * airspeed * airspeed;
+        let at_trim = trim.controls;
+        let lift = |alpha: f64, elevator: f64| {
+            let state = State { alpha, airspeed, ..State::NEUTRAL };
+            let mut controls = at_trim;
+            controls.elevator += elevator;
+            let [_, _, down] = Twin::at_rest(state, &controls, altitude).specific_force(model);
+            -down / pressure
+        };
+        let angle = |k: usize| (FIRST_DEG + SPACING_DEG * k as f64) * DEGREE;
+        let all: Vec<f64> = (0..COUNT).map(|k| lift(angle(k), 0.0)).collect();
+        // the longest rising part around zero: up to the stall, and from a stall on the back on
+        let zero = (-FIRST_DEG / SPACING_DEG) as usize;
+        let rises = |k: &usize| all[k + 1] > all[*k];
+        let last = (zero..COUNT - 1).take_while(rises).last().map_or(zero, |k| k + 1);
+        let first = (0..zero).rev().take_while(rises).last().unwrap_or(zero);
+        let at = trim.state.alpha;
+        let by_elevator = (lift(at, ELEVATOR) - lift(at, 0.0)) / ELEVATOR;
+        let wide = (last - first) as f64 * SPACING_DEG >= 5.0 && by_elevator.is_finite();
+        Ok(wide.then(|| LiftCurve {
+            rising: all[first..=last].to_vec(),
+            from: angle(first),
+            by_elevator,
+            trim: trim.controls.elevator,
+        }))
+    }
+
+    /// Angle of attack (rad) with the upward specific force `lift` by dynamic pressure, at the elevator deflection `elevator`
+    /// (rad). Beyond the ends of the rising part it is that of the end.
+    fn angle(&self, lift: f64, elevator: f64) -> f64 {
+        let lift = lift - self.by_elevator * (elevator - self.trim);
+        let k = self.rising.partition_point(|x| *x < lift).clamp(1, self.rising.len() - 1);
+        let [low, high] = [self.rising[k - 1], self.rising[k]];
+        let part = ((lift - low) / (high - low)).clamp(0.0, 1.0);
+        self.from + SPACING_DEG * DEGREE * (k as f64 - 1.0 + part)
+    }
+}
+
+/// The correction of the link's angle of attack.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ByLift {
+    /// Time of the last state, and the correction then, rad.
+    last: Option<(Time, f64)>,
+}
+
+impl ByLift {
+    /// Angle of attack for control, rad: that of a vane, or the link's estimate in `frame`, corrected by the lift of `curve`.
+    pub(super) fn alpha(&mut self, curve: Option<&LiftCurve>, frame: &Telemetry) -> f64 {
+        let estimated = frame.state.alpha;
+        let Some(curve) = curve.filter(|_| frame.incidence_sd[0] > VANE_SD[0]) else {
+            return estimated;
+        };
+        let (mut added, mut step) = (0.0, 0.0);
+        if let Some((before, last)) = self.last {
+            let passed = frame.time.since(before).as_secs_f64();
+            if passed <= GAP_S {
+                (added, step) = (last, passed);
+            }
+        }
+        let (airspeed, down) = (frame.state.airspeed, frame.specific_force[2]);
+        let whole = !frame.faults.contains(Faults::SPECIFIC_FORCE) && airspeed > SLOWEST_MPS;
+        let pressure = 0.5 * standard_density(frame.altitude) * airspeed * airspeed;
+        let lift = -down / pressure;
+        if whole && lift.is_finite() {
+            let off = curve.angle(lift, frame.actuators.elevator) - (estimated + added);
+            added += off * (step / TIME_S).min(1.0);
+        } else {
+            added -= added * (step / FORGOTTEN_S).min(1.0);
+        }
+        let added = added.clamp(-MOST, MOST);
+        self.last = Some((frame.time, added));
+        estimated + added
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use greylag_link::vehicle::Order;
+    use greylag_physics::ActuatorState;
+
+    fn model() -> GreyBox {
+        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+        GreyBox::load(&std::path::Path::new(root).join("params/x8/jsbsim.toml")).unwrap()
+    }
+
+    /// A state in level flight at 20 m/s, `k` hundredths of a second after the first, with the link's estimate of the angle of attack
+    /// and the specific force of the model at the angle `truth` (rad).
+    fn frame(model: &GreyBox, k: u64, estimated: f64, truth: f64) -> Telemetry {
+        let altitude = model.airframe.reference.altitude;
+        let trim = Trim::straight(model, 20.0, altitude).unwrap();
+        let state = State { alpha: truth, airspeed: 20.0, ..State::NEUTRAL };
+        let specific_force = Twin::at_rest(state, &trim.controls, altitude).specific_force(model);
+        Telemetry {
+            time: Time::from_micros(10_000 * k),
+            order: Order::First,
+            faults: Faults::NONE,
+            state: State { alpha: estimated, ..state },
+            incidence_sd: [0.02; 2],
+            yaw: 0.0,
+            rate_hold_s: 0.0,
+            specific_force,
+            actuators: ActuatorState { elevator: trim.controls.elevator, ..Default::default() },
+            altitude,
+            position: [f64::NAN; 2],
+            velocity: [f64::NAN; 3],
+            wind: [f64::NAN; 3],
+        }
+    }
+
+    #[test]
+    fn in_air_that_rises_the_lift_tells_the_angle_of_attack() {
+        let model = model();
+        let curve = LiftCurve::of(&model, 20.0).unwrap().unwrap();
+        let (mut by_lift, mut alpha) = (ByLift::default(), 0.0);
+        for k in 0..100 {
+            // the air rises by 3.5 m/s
+            alpha = by_lift.alpha(Some(&curve), &frame(&model, k, 0.03 + 0.175, 0.03));
+        }
+        assert!((alpha - 0.03).to_degrees().abs() < 0.3, "{}", alpha.to_degrees());
+        // without an accelerometer the estimate is believed again
+        for k in 100..1100 {
+            let mut blind = frame(&model, k, 0.1, 0.03);
+            blind.faults.insert(Faults::SPECIFIC_FORCE);
+            alpha = by_lift.alpha(Some(&curve), &blind);
+        }
+        assert!((alpha - 0.1).to_degrees().abs() < 0.1, "{}", alpha.to_degrees());
+    }
+
+    #[test]
+    fn a_vane_is_believed_and_what_is_no_number_corrects_nothing() {
+        let model = model();
+        let curve = LiftCurve::of(&model, 20.0).unwrap().unwrap();
+        let mut by_lift = ByLift::default();
+        let vane = Telemetry { incidence_sd: VANE_SD, ..frame(&model, 0, 0.2, 0.03) };
+        assert_eq!(by_lift.alpha(Some(&curve), &vane), 0.2);
+        assert_eq!(by_lift.alpha(None, &frame(&model, 1, 0.2, 0.03)), 0.2);
+        for k in 2..50 {
+            let bad = Telemetry { specific_force: [f64::NAN; 3], ..frame(&model, k, 0.2, 0.03) };
+            assert_eq!(by_lift.alpha(Some(&curve), &bad), 0.2);
+        }
+    }
+}
