@@ -168,7 +168,8 @@ fn leaving_out_one_flight_after_the_other_names_the_lag() {
     let half = |k: usize| {
         let mut half = all[k / 2].clone();
         let middle = half.segments[0].instants.len() / 2;
-        let range = if k % 2 == 0 { 0..middle } else { middle..half.segments[0].instants.len() };
+        let range =
+            if k.is_multiple_of(2) { 0..middle } else { middle..half.segments[0].instants.len() };
         half.name = format!("half {k}");
         half.segments[0].instants = half.segments[0].instants[range].to_vec();
         half
