@@ -83,6 +83,6 @@ fn in_gusts_a_vane_keeps_the_gain_that_other_flights_show() {
     let found = reconstruct(through_gusts(), &options).unwrap();
     let gain = found.nuisances.iter().find(|n| n.name == "beta_gain").unwrap();
     assert!((gain.value - 0.08).abs() < 1e-3 && gain.sd == 0.01, "{gain:?}");
-    let told = |name: &str| found.installation.iter().any(|e| e.name == name);
-    assert!(!told("beta_gain") && !told("alpha_gain") && !told("board_roll"));
+    let estimated = |name: &str| found.installation.iter().any(|e| e.name == name);
+    assert!(!estimated("beta_gain") && !estimated("alpha_gain") && !estimated("board_roll"));
 }
