@@ -24,11 +24,11 @@ mod outside_flights;
 mod ratios;
 
 use anyhow::{Context, Result, bail};
-use greylag::model::{GreyBox, Named};
+use greylag::model::GreyBox;
 use greylag::sysid::amend::leave_one_out::{
     Effort, Fitted, Scored, Structure, alternatives, leave_one_out,
 };
-use greylag::sysid::amend::{Options, Prior, Refused, amend};
+use greylag::sysid::amend::{Options, Prior, Refused, amend, widened};
 use greylag::sysid::compare::arx::{self, Arx, Choice};
 use greylag::sysid::compare::{HorizonScore, forecast, scores};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
@@ -291,10 +291,7 @@ fn fitted(model: &GreyBox, fit: &[Reconstruction], place: usize) -> GreyBox {
     let (start, options) = match &structures(model)[place].fitted {
         Fitted::Nothing | Fitted::LinearResidual => return model.clone(),
         Fitted::FromScratch => (model.clone(), Options { prior: Prior::Bounds, ..usual }),
-        Fitted::Widened(factor) => {
-            let wider = |c: &Named| (c.width() > 0.0).then(|| factor * c.width());
-            (model.clone().with_widths(wider), usual)
-        }
+        Fitted::Widened(factor) => (widened(model, *factor), usual),
         Fitted::Coefficients { effects, per_flight } => {
             let (effects, per_flight) = (effects.clone(), *per_flight);
             (model.clone(), Options { effects, refused: Refused::Kept, per_flight, ..usual })

@@ -4,6 +4,7 @@
 use anyhow::{Result, bail};
 
 use crate::model::GreyBox;
+use crate::sysid::amend;
 
 /// A coefficient with its lower and upper bound.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,7 +63,7 @@ pub fn widened(model: GreyBox, factor: Option<f64>) -> Result<GreyBox> {
     if !(factor.is_finite() && factor > 0.0) {
         bail!("--widths {factor}: give a positive factor, such as 3");
     }
-    Ok(model.with_widths(|c| (c.width() > 0.0).then(|| factor * c.width())))
+    Ok(amend::widened(&model, factor))
 }
 
 #[cfg(test)]

@@ -34,6 +34,7 @@ pub use error::AmendError;
 pub use flight::Flight;
 pub use judge::contradictions;
 pub use output_error::{Fit, FitOptions};
+pub use parameters::widened;
 pub use quick::{Estimate, estimate, tune};
 pub use result::{
     AddedEffect, Amendment, FittedFlight, FlightEstimate, OwnConstant, Parameter, Settings,

@@ -134,7 +134,7 @@ pub(super) fn from_scratch(model: &GreyBox) -> GreyBox {
 }
 
 /// `model` with the prior standard deviations of its free coefficients multiplied by `factor`.
-pub(super) fn widened(model: &GreyBox, factor: f64) -> GreyBox {
+pub fn widened(model: &GreyBox, factor: f64) -> GreyBox {
     let wider = |c: &Named| (c.width() > 0.0).then(|| factor * c.width());
     model.clone().with_widths(wider)
 }
