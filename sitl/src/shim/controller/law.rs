@@ -192,10 +192,9 @@ impl Law {
         let airspeed = seen.airspeed_mps.max(self.stack.least_mps);
         let turn = now.clamp(-COORDINATED, COORDINATED).tan() * up.cos() * GRAVITY / airspeed;
         let [p, q] = match self.stack.turns {
-            Turns::BothAxes => [
-                roll_rate - up.sin() * turn,
-                now.cos() * pitch_rate + up.cos() * now.sin() * turn,
-            ],
+            Turns::BothAxes => {
+                [roll_rate - up.sin() * turn, now.cos() * pitch_rate + up.cos() * now.sin() * turn]
+            }
             // without the body roll rate of a climbing turn, which stays as a roll error
             Turns::PitchAlone => [roll_rate, pitch_rate + now.sin() * turn],
         };
