@@ -8,7 +8,7 @@ use greylag::sysid::diagnose::{Candidate, Detail, Diagnosis, Options, diagnose};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 
 use crate::cases::Case;
-use crate::record::Record;
+use crate::record::{Judged, Record};
 
 /// Number of candidates of a diagnosis that are recorded.
 const KEPT: usize = 10;
@@ -59,11 +59,24 @@ impl Answer {
         let flights = flights.iter().filter(|f| f.value.is_finite());
         record.by_flight = flights.map(|f| [f.value, f.sd]).collect();
         record.evidence = effects.iter().take(KEPT).map(|c| [c.evidence, c.threshold]).collect();
+        record.judged = effects.iter().take(KEPT).map(judged).collect();
+        record.learnable = self.said.learnable_remainder;
+        let explanations = self.said.explanations.iter();
+        record.explanations = explanations.map(|e| (e.id.clone(), e.probability)).collect();
         let told = effects.iter().enumerate().filter(|(k, c)| *k == 0 || c.asserted);
         record.alike = told.map(|(_, c)| (id(c), c.indistinguishable_from.clone())).collect();
         let least = |c: &Candidate| Some((c.id.clone(), c.minimum_detectable? * hidden(c)));
         record.minimum_detectable = effects.iter().filter_map(least).collect();
         record.reached = reached(record);
+    }
+}
+
+fn judged(c: &Candidate) -> Judged {
+    let status = serde_json::to_value(c.status).ok();
+    Judged {
+        status: status.and_then(|s| Some(s.as_str()?.to_owned())).unwrap_or_default(),
+        stable: Some(c.selected_in_bootstraps).filter(|x| x.is_finite()),
+        held_out: Some(c.heldout_error_reduction).filter(|x| x.is_finite()),
     }
 }
 

@@ -71,6 +71,9 @@ struct Arguments {
     /// File with the results, one line of JSON per case. Cases in this file are not repeated.
     #[arg(long, default_value = "target/hide-and-find.jsonl")]
     results: PathBuf,
+    /// Only diagnose: without fits and errors on held-out flights.
+    #[arg(long)]
+    diagnose_only: bool,
     /// Only print the table of the results in the file.
     #[arg(long)]
     table: bool,
@@ -112,7 +115,9 @@ fn main() -> Result<()> {
             .with_context(|| format!("creating {}", folder.display()))?;
     }
     if !arguments.table {
-        let bench = Bench::new(&arguments.model, &arguments.aircraft, arguments.simulated_nulls)?;
+        let mut bench =
+            Bench::new(&arguments.model, &arguments.aircraft, arguments.simulated_nulls)?;
+        bench.diagnose_only = arguments.diagnose_only;
         // the amplitudes of the second group depend on the minimum detectable amplitudes of the first
         for parts in [
             [Part::Nulls, Part::Installed, Part::Probes].as_slice(),

@@ -43,6 +43,17 @@ pub struct Seconds {
     pub amend: f64,
 }
 
+/// Results of the checks of a candidate.
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
+pub struct Judged {
+    /// Classification of the candidate, as in the JSON of a diagnosis.
+    pub status: String,
+    /// Share of block bootstraps in which the candidate ranks first; `None` if not computed.
+    pub stable: Option<f64>,
+    /// Share of the residual that it removes in held-out blocks; `None` if not computed.
+    pub held_out: Option<f64>,
+}
+
 /// A test case with its result.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
 pub struct Record {
@@ -86,6 +97,15 @@ pub struct Record {
     pub by_flight: Vec<[f64; 2]>,
     /// Evidence and threshold of each candidate in `ranked`.
     pub evidence: Vec<[f64; 2]>,
+    /// What else the probabilities are computed from, for each candidate in `ranked`.
+    #[serde(default)]
+    pub judged: Vec<Judged>,
+    /// Share of the residual beyond noise that a flexible model still removes.
+    #[serde(default)]
+    pub learnable: f64,
+    /// Probability of each explanation: effects by their ids, `other_effect`, `nothing`, `unknown`.
+    #[serde(default)]
+    pub explanations: BTreeMap<String, f64>,
     /// Minimum detectable amplitude of each candidate.
     pub minimum_detectable: BTreeMap<String, f64>,
     /// Fitted coefficients of the true effects that were asserted.

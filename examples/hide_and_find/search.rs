@@ -40,6 +40,8 @@ pub struct Bench {
     controller: Box<dyn Controller>,
     /// Number of surrogate data sets without an effect in each diagnosis; `None` for the default number.
     nulls: Option<usize>,
+    /// Whether fits and errors on held-out flights are left out.
+    pub diagnose_only: bool,
 }
 
 /// The flights of a case.
@@ -67,6 +69,7 @@ impl Bench {
             subject: Subject::new(plant, &model.airframe).map_err(|why| anyhow!("{why}"))?,
             controller: build(ControllerKind::Lqi, &model)?,
             nulls,
+            diagnose_only: false,
         })
     }
 
@@ -75,7 +78,7 @@ impl Bench {
         &self.craft
     }
 
-    /// Flies a case and reconstructs its logs. The test flights are omitted if no effect is hidden.
+    /// Flies a case and reconstructs its logs. The test flights are omitted if no effect is hidden or nothing is fitted.
     pub fn fly(&self, case: &Case) -> Result<Flown> {
         let begun = Instant::now();
         let Case { seed, missing, .. } = case;
@@ -90,7 +93,8 @@ impl Bench {
             installed: case.installed().map(|(_, of)| of).unwrap_or_default(),
         };
         let logs = trial.fly(self.controller.as_ref())?;
-        let testing = if case.factor == 0.0 { &[][..] } else { &logs.testing };
+        let testing =
+            if case.factor == 0.0 || self.diagnose_only { &[][..] } else { &logs.testing };
         let all = |logs: &[Log]| logs.iter().map(|log| rebuilt(log, &model)).collect::<Result<_>>();
         let (training, testing) = (all(&logs.training)?, all(testing)?);
         Ok(Flown { model, training, testing, seconds: begun.elapsed().as_secs_f64() })
@@ -121,7 +125,7 @@ fn fill(record: &mut Record, case: &Case, flown: &Flown, bench: &Bench) -> Resul
     let answer = ask(&flown.model, &flown.training, case, bench.nulls)?;
     record.seconds.diagnose = begun.elapsed().as_secs_f64();
     answer.write_into(record);
-    if case.factor == 0.0 {
+    if case.factor == 0.0 || bench.diagnose_only {
         return Ok(());
     }
     let begun = Instant::now();

@@ -267,6 +267,7 @@ pub fn diagnosis() -> Diagnosis {
         "lift_linear.CLde",
     ];
     Diagnosis {
+        explanations: Vec::new(),
         schema: "greylag.diagnosis/1",
         version: "0.1.0",
         model: "prior".into(),

@@ -93,10 +93,14 @@ TAKEN_OUT = {"drag_beta2": "drag_beta2", "drag_elevator_abs": "drag_elevator_abs
 """What a model loses so that it lacks the effect, where the aircraft has it of its own."""
 
 
-def amplitude(effect, truth, random):
-    """A clear amplitude of `effect`, drawn."""
+THRESHOLDS = ("lift_stall", "rate_limit")
+"""Effects whose amplitude is where they begin: a part of it is no weaker effect."""
+
+
+def amplitude(effect, truth, random, strength=1.0):
+    """`strength` times a clear amplitude of `effect`, drawn."""
     low, high, either_sign = AMPLITUDES[effect]
-    size = random.uniform(low, high)
+    size = random.uniform(low, high) * (1.0 if effect in THRESHOLDS else strength)
     if either_sign and random.random() < 0.5:
         size = -size
     if effect == "lift_stall" and truth == "official":

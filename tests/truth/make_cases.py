@@ -3,12 +3,13 @@
     python tests/truth/make_cases.py --truth continuous --seed 1 --effects all --nulls 20 --out cases
     python tests/truth/make_cases.py --truth continuous --seed 1 --formulas 24 --nulls 20 --out cases
     python tests/truth/make_cases.py --truth official --seed 1 --effects all --nulls 20 --installed 1 --out cases
+    python tests/truth/make_cases.py --truth official --seed 1 --effects all --strength 0.33 --out cases
     python tests/truth/make_cases.py --truth official --seed 1 --both 100 --installed 1 --out cases
     python tests/truth/make_cases.py --truth official --seed 1 --effects '' --nulls 100 --installed 1 --errors servo_sides --out cases
 
 The second command hides formulas of `formulas.py` in place of effects, for `greylag propose`. The third draws an error of
-installation or calibration (`installed.py`) for each case. The fourth draws an effect and an error for each of 100 cases.
-The fifth hides nothing, and all cases have the named error. Every case is a folder
+installation or calibration (`installed.py`) for each case. The fourth hides a third of the usual amounts. The fifth draws an
+effect and an error for each of 100 cases. The sixth hides nothing, and all cases have the named error. Every case is a folder
 with model.toml, airframe.toml, train-1..3.csv, test-1..2.csv and truth.json. All of it follows from the seed.
 """
 
@@ -93,9 +94,10 @@ def flown_with_formula(fly, draw, case, seed, duration, strength):
     raise Lost(f"{case}: none of {DRAWS} formulas can be flown")
 
 
-def make_case(folder, kind, case, seed, effect, options, duration, wrong, strength=1.0, errors=((), 0)):
+def make_case(folder, kind, case, seed, effect, options, duration, wrong, strengths=(1.0, 1.0), errors=((), 0)):
     """Writes one case; `effect` is an id, one of `DRAWN` for a formula that is drawn, or None.
 
+    `strengths`: least and largest factor on the amount, which is drawn log-uniformly.
     `errors`: kinds of errors of installation, and how many of them are drawn.
     """
     (fly, step), folder = truth_of(kind), folder / case
@@ -108,6 +110,8 @@ def make_case(folder, kind, case, seed, effect, options, duration, wrong, streng
     gust = wrongly.get("gusts", {}).get("size", 0.0)
     if wrongly:
         record["installed"] = wrongly
+    low, high = strengths
+    strength = low * (high / low) ** hidden.random_of(seed, case, 11).random() if low < high else low
     if effect in DRAWN:
         formula, flights, lost = flown_with_formula(fly, DRAWN[effect], case, seed, duration, strength)
         record.update(hidden=formula.text(), amount=formula.amount, formula=formula.record(), strength=strength)
@@ -115,7 +119,8 @@ def make_case(folder, kind, case, seed, effect, options, duration, wrong, streng
         effect = None
     else:
         if effect:
-            record["amount"] = hidden.amplitude(effect, kind.split("-")[0], hidden.random_of(seed, case, 3))
+            record["amount"] = hidden.amplitude(effect, kind.split("-")[0], hidden.random_of(seed, case, 3), strength)
+            record["strength"] = strength
         flights = flown(fly, case, seed, effect, record["amount"], duration, gust)
     for flight, (rows, commands, drawn) in flights.items():
         random = hidden.random_of(seed, case, *flight.encode(), 4)
@@ -163,6 +168,12 @@ def pairs(text):
     return {k: float(v) for k, v in (pair.split("=") for pair in text.split(",") if pair)}
 
 
+def range_of(text):
+    """`FACTOR` or `LOW..HIGH`."""
+    low, _, high = text.partition("..")
+    return float(low), float(high or low)
+
+
 def arguments():
     """The command line."""
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -171,7 +182,7 @@ def arguments():
     p.add_argument("--effects", help="'all', or ids with commas between; '' for none; all if no formulas are asked for")
     p.add_argument("--formulas", type=int, default=0, help="cases that hide a formula; of the continuous truth alone")
     p.add_argument("--lagged", type=int, default=0, help="cases that hide a control through a lag; of the same")
-    p.add_argument("--strength", type=float, default=1.0, help="factor on the amounts of the formulas")
+    p.add_argument("--strength", type=range_of, default=(1.0, 1.0), help="factor on the amounts; LOW..HIGH: drawn for each case, log-uniformly")
     p.add_argument("--nulls", type=int, default=0, help="cases without a hidden effect")
     p.add_argument("--rate", type=float, default=100.0, help="samples a second of the logs")
     p.add_argument("--noise", type=float, default=1.0, help="factor on the sensors' noise and biases")
@@ -205,6 +216,8 @@ def main():
         sys.exit("--both: say with --installed how many errors each case has")
     errors = (kinds_of_errors(a.errors, a.truth), a.installed)
     effects = a.effects if a.effects is not None else "" if a.formulas or a.lagged else "all"
+    if effects == "all" and a.strength != (1.0, 1.0):
+        effects = ",".join(x for x in hidden.AMPLITUDES if x not in hidden.THRESHOLDS)
     cases = [(f"{a.truth}-null-{k:02}", None) for k in range(a.nulls)]
     cases += beside_errors(a.both, a.truth, a.seed, effects) if a.both else [(f"{a.truth}-{e}", e) for e in chosen(effects)]
     cases += [(f"{a.truth}-formula-{k:02}", FORMULA) for k in range(a.formulas)]

@@ -16,8 +16,8 @@ import scoring
 from hidden import PARAMETERS
 
 
-def diagnose(greylag, case, nulls):
-    """What greylag says of a case, as one record beside the truth."""
+def diagnose(greylag, case, nulls, without=False):
+    """What greylag says of a case, as one record beside the truth; `without`: the hidden effect is taken out of the catalogue."""
     truth = json.loads((case / "truth.json").read_text())
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "diagnosis.json"
@@ -25,11 +25,14 @@ def diagnose(greylag, case, nulls):
         command += ["--log", *sorted(case.glob("train-*.csv"))]
         if nulls is not None:
             command += ["--nulls", nulls]
+        if without and truth["hidden"]:
+            command += ["--without", truth["hidden"]]
         done = subprocess.run([str(x) for x in command], capture_output=True, text=True)
         said = json.loads(out.read_text()) if out.exists() else None
     record = {"greylag": str(greylag), "folder": str(case)}
     record |= {"case": truth["case"], "truth": truth["truth"], "seed": truth["seed"], "hidden": truth["hidden"]}
     record.update(amount=truth["amount"], sensors=truth["sensors"], exit=done.returncode)
+    record |= {k: truth[k] for k in ("strength",) if k in truth} | ({"without": truth["hidden"]} if without else {})
     if "installed" in truth:
         record["installed"] = truth["installed"]
     if said is None:
@@ -47,6 +50,9 @@ def digest(said):
         "values": {e["id"]: {p["name"]: [p["value"], *p["ci95"]] for p in e["parameters"]} for e in asserted},
         "ranked": [e["id"] for e in effects[:5]],
         "evidence": [[e["evidence"], e["threshold"]] for e in effects[:5]],
+        "judged": [{"status": e["status"], "stable": e["selected_in_bootstraps"], "held_out": e["heldout_error_reduction"]} for e in effects[:5]],
+        "least": {e["id"]: e["minimum_detectable"] for e in effects if e["minimum_detectable"]},
+        "explanations": {e["id"]: e["probability"] for e in said.get("explanations", [])},
         "alike": {e["id"]: e["indistinguishable_from"] for e in effects[:5] if e["indistinguishable_from"]},
         "measured": sorted({m["id"] for m in said["measurement"] if m["asserted"]}),
         "errors": sorted({m["id"] for m in said["measurement"] if m["asserted"] and of_installation(m)}),
@@ -224,6 +230,7 @@ def main():
     """Scores the cases of the command line."""
     p = scoring.arguments(__doc__, jobs=2)
     p.add_argument("--nulls", type=int, help="simulated nulls of each diagnosis; the program's default without")
+    p.add_argument("--without-hidden", action="store_true", help="take the hidden effect out of the catalogue")
     p.add_argument("--resume", action="store_true", help="keep what the JSONL file has of the same program and case")
     p.add_argument("--strict", action="store_true", help="exit with 1 if anything wrong is asserted or a case fails")
     a = p.parse_args()
@@ -233,7 +240,7 @@ def main():
         return
     cases = scoring.folders(p, a)
     before = answered(a.jsonl, a.greylag) if a.resume else {}
-    judge = lambda case: before.get(str(case)) or diagnose(a.greylag, case, a.nulls)  # noqa: E731
+    judge = lambda case: before.get(str(case)) or diagnose(a.greylag, case, a.nulls, a.without_hidden)  # noqa: E731
     records = scoring.score(cases, a, judge, line, before)
     print("\n" + tables(records))
     if a.strict and any(wrong(r) or r["verdict"] == "failed" for r in records):

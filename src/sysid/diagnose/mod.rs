@@ -14,6 +14,7 @@ mod regression;
 pub(crate) mod search;
 
 pub use answer::curves::over_the_best;
+pub use answer::probability::{Explained, Explanation};
 pub use answer::result::{
     Advice, Candidate, ChannelLeft, Curve, Decoy, Diagnosis, FlightEstimate, FlightTrim,
     Measurement, Nulls, Parameter, Settings, Status, Tuned, Verdict,

@@ -8,6 +8,7 @@ pub(super) mod detectable;
 pub(super) mod impossible;
 pub(super) mod measurement;
 pub(super) mod per_flight;
+pub(super) mod probability;
 pub(super) mod ranking;
 pub(super) mod result;
 pub(super) mod rival;

@@ -5,6 +5,7 @@
 
 use serde::Serialize;
 
+use super::probability::Explanation;
 use super::shares;
 use crate::compare::answer::{Acting, Compared};
 use crate::per_flight::PerFlight;
@@ -55,6 +56,9 @@ pub struct Diagnosis {
     pub doubtful: Vec<String>,
     /// Every candidate: the asserted ones first, in the order of their selection, then the others by evidence.
     pub effects: Vec<Candidate>,
+    /// Probabilities of what the model lacks above all, the largest first; their sum is 1. They concern the first entry of
+    /// `effects`. Empty if the verdict is [`Verdict::Unknown`].
+    pub explanations: Vec<Explanation>,
     /// What the re-estimated model leaves unexplained in each channel, without and with the asserted effects.
     pub channels: Vec<ChannelLeft>,
     /// Sensor errors and wind of each flight, estimated from kinematics alone. If requested, also misalignment angles of the

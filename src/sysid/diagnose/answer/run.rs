@@ -9,6 +9,7 @@ use crate::diagnose::answer::decoys;
 use crate::diagnose::answer::impossible::impossible;
 use crate::diagnose::answer::measurement;
 use crate::diagnose::answer::per_flight;
+use crate::diagnose::answer::probability;
 use crate::diagnose::answer::ranking;
 use crate::diagnose::answer::result::{ChannelLeft, Diagnosis, Nulls, Settings, Tuned, Verdict};
 use crate::diagnose::answer::rival::against_axes;
@@ -95,6 +96,10 @@ fn of_unknown(
     measurement.extend(per_flight::angles(found.round()));
     let trims = per_flight::trims(found.round());
     let (verdict, why_unknown) = spoken(&found, &doubtful, &channels, faultless);
+    let explanations = match verdict {
+        Verdict::Unknown => Vec::new(),
+        _ => probability::explanations(&effects, found.learnable()),
+    };
     notes.extend(sentences::notes(&found, model, verdict, options));
     let decoys = match options.detail {
         Detail::Full => decoys::decoys(&found, options.seed),
@@ -106,6 +111,7 @@ fn of_unknown(
         why_unknown,
         doubtful: &doubtful,
         effects: &effects,
+        explanations: &explanations,
         channels: &channels,
         measurement: &measurement,
         trims: &trims,
@@ -119,6 +125,7 @@ fn of_unknown(
         doubtful,
         advice: advice::advice(&found, verdict, &effects, &channels),
         effects,
+        explanations,
         channels,
         measurement,
         trims,

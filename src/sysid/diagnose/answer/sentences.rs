@@ -2,6 +2,7 @@
 //! lacks. The evidence of an effect must exceed a threshold, which chance hardly reaches. The residual is measured minus
 //! modelled forces and moments.
 
+use crate::diagnose::answer::probability::{self, Explanation};
 use crate::diagnose::answer::result::{
     Candidate, ChannelLeft, FlightTrim, Measurement, Parameter, Status, Verdict,
 };
@@ -36,6 +37,8 @@ pub struct Content<'a> {
     pub doubtful: &'a [String],
     /// All candidates (physical effects that the model may lack), the asserted effects first.
     pub effects: &'a [Candidate],
+    /// Probabilities of the explanations.
+    pub explanations: &'a [Explanation],
     /// Unexplained residual of each channel.
     pub channels: &'a [ChannelLeft],
     /// Sensor errors and wind of each flight.
@@ -56,7 +59,7 @@ pub enum WhyUnknown {
 }
 
 /// Describes the results in sentences. Their order is: impossible estimates, misaligned axes, missing effects and verdict,
-/// small effects, remaining residual, refused effects, channels without judgement, sensors, trims.
+/// probabilities, small effects, remaining residual, refused effects, channels without judgement, sensors, trims.
 pub fn sentences(content: &Content) -> Vec<String> {
     let Content { verdict, doubtful, effects, channels, measurement, .. } = *content;
     let mut all: Vec<String> = doubtful.to_vec();
@@ -66,6 +69,8 @@ pub fn sentences(content: &Content) -> Vec<String> {
     }
     all.extend(effects.iter().filter(|c| c.asserted).map(asserted));
     all.extend(verdict::sentence(content));
+    let several = effects.iter().filter(|c| c.asserted).count() > 1;
+    all.extend(probability::sentence(content.explanations, several));
     all.extend(effects.iter().filter(|c| c.status == Status::Small).map(small));
     if verdict != Verdict::Unknown {
         all.extend(beyond(content));
