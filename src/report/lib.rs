@@ -79,6 +79,7 @@ pub use kit::html::escape;
 pub use kit::intervals::{IntervalBins, IntervalPanel, Intervals};
 pub use kit::loop_timing::{Cycle, LoopTiming};
 pub use kit::page::{Folding, Page, Section};
+pub use kit::probabilities::{Probabilities, ProbabilityRow};
 pub use kit::table::{Align, Column, Row, Table};
 pub use kit::time_figure::{Band, Mark, Panel, Scale, Series, TimeFigure, Track};
 pub use kit::time_line::{Span, States, TimeLine, Tone, TraceLine, Traces};

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use crate::report_comparison;
 use crate::report_diagnosis;
-use greylag::report::{DiagnosisReport, Figure, Page};
+use greylag::report::{DiagnosisReport, Figure, Page, Probabilities};
 use greylag::sysid::compare::{Answer, Comparison};
-use greylag::sysid::diagnose::{Diagnosis, Verdict};
+use greylag::sysid::diagnose::{Diagnosis, Explained, Explanation, Verdict};
 use serde_json::Value;
 
 fn report<'a>(d: &'a Diagnosis, both: Option<[&'a Comparison; 2]>) -> DiagnosisReport<'a> {
@@ -169,6 +169,51 @@ fn chance_is_counted_with_the_suspect_marked() {
     assert_eq!([of("lift_stall"), of("threshold"), of("best decoy")], [143.0, 12.4, 7.5]);
 }
 
+/// The figure of the probabilities; `None` if the page has none.
+fn probabilities(page: &Page) -> Option<&Probabilities> {
+    let mut figures = page.sections.iter().flat_map(|s| &s.figures);
+    figures.find_map(|figure| match figure {
+        Figure::Probabilities(found) => Some(found),
+        _ => None,
+    })
+}
+
+/// The most probable explanation comes first. Without explanations, as with the verdict "unknown", there is no figure.
+#[test]
+fn the_probable_explanations_stand_beside_the_suspects() {
+    let mut d = report_diagnosis::diagnosis();
+    let html = page(&d).render();
+    let (_, suspects) = html.split_once("<h2>Suspects</h2>").unwrap();
+    let (suspects, _) = suspects.split_once("</section>").unwrap();
+    let places = [
+        "How probable each explanation is",
+        "<dt>lift_stall</dt>",
+        ">93 %<",
+        "<dt>nothing is missing that these flights could show</dt>",
+        ">6 %<",
+        "Evidence against chance",
+    ]
+    .map(|part| suspects.find(part).unwrap_or_else(|| panic!("no {part}")));
+    assert!(places.is_sorted(), "{places:?}");
+    // 0.4 % is below the limit of 0.5 %
+    assert!(!suspects.contains("something that the catalogue lacks"));
+    d.explanations.clear();
+    assert!(probabilities(&page(&d)).is_none());
+}
+
+#[test]
+fn the_workbench_words_the_probabilities_like_the_page() {
+    let script = include_str!("../../src/workbench/assets/suspects.js");
+    let page = page(&report_diagnosis::diagnosis());
+    let figure = probabilities(&page).expect("the page has probabilities");
+    let kinds = [Explained::Nothing, Explained::OtherEffect, Explained::Unknown];
+    let of = |kind| Explanation { id: String::new(), kind, probability: 0.5 };
+    let phrases = kinds.map(|kind| of(kind).words().to_string());
+    for words in [&figure.title, &figure.note].into_iter().chain(&phrases) {
+        assert!(script.contains(&format!("\"{words}\"")), "the workbench does not say {words:?}");
+    }
+}
+
 #[test]
 fn hostile_text_stays_text() {
     let hostile = "</script><script>alert(1)</script><!-- \"' & <b>\u{0}";
@@ -191,6 +236,7 @@ fn hostile_text_stays_text() {
                 (hostile.into(), hostile.into(), hostile.into());
         }
     }
+    d.explanations.iter_mut().for_each(|e| e.id = hostile.into());
     d.tuned.iter_mut().for_each(|t| t.name = hostile.into());
     d.decoys.iter_mut().for_each(|x| x.name = hostile.into());
     d.channels.iter_mut().for_each(|c| c.channel = hostile.into());
@@ -330,6 +376,7 @@ fn a_diagnosis_that_found_nothing_is_still_a_page() {
     broken.tuned.iter_mut().for_each(|t| (t.prior_sd, t.value) = (0.0, nan));
     broken.nulls.best = vec![nan, f64::INFINITY, -1.0];
     broken.decoys.iter_mut().for_each(|x| x.evidence = nan);
+    broken.explanations.iter_mut().for_each(|e| e.probability = nan);
     let html = page(&broken).render();
     assert!(html.contains("cannot be determined"));
     assert!(!html.contains("NaN") && !html.contains(">inf"), "a number that is none is printed");

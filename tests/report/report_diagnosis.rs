@@ -4,8 +4,8 @@
 use greylag::sysid::compare::answer::Acting;
 use greylag::sysid::compare::{ChannelId, Comparison};
 use greylag::sysid::diagnose::{
-    Advice, Candidate, ChannelLeft, Curve, Decoy, Diagnosis, FlightEstimate, Measurement, Nulls,
-    Parameter, Settings, Status, Tuned, Verdict,
+    Advice, Candidate, ChannelLeft, Curve, Decoy, Diagnosis, Explained, Explanation,
+    FlightEstimate, Measurement, Nulls, Parameter, Settings, Status, Tuned, Verdict,
 };
 
 const FLIGHTS: [&str; 3] = ["train-1.csv", "train-2.csv", "train-3.ulg"];
@@ -128,6 +128,17 @@ const CANDIDATES: [Row; 12] = [
         0.006,
     ),
 ];
+
+/// Id, kind and probability. What is below 0.5 % is not shown.
+const EXPLANATIONS: [(&str, Explained, f64); 3] = [
+    ("lift_stall", Explained::Aircraft, 0.932),
+    ("nothing", Explained::Nothing, 0.064),
+    ("unknown", Explained::Unknown, 0.004),
+];
+
+fn explanation((id, kind, probability): (&str, Explained, f64)) -> Explanation {
+    Explanation { id: id.into(), kind, probability }
+}
 
 fn candidate(
     &(id, description, evidence, threshold, name, value, half, unit, least): &Row,
@@ -267,7 +278,7 @@ pub fn diagnosis() -> Diagnosis {
         "lift_linear.CLde",
     ];
     Diagnosis {
-        explanations: Vec::new(),
+        explanations: EXPLANATIONS.map(explanation).into(),
         schema: "greylag.diagnosis/1",
         version: "0.1.0",
         model: "prior".into(),

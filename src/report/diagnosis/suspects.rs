@@ -1,17 +1,17 @@
-//! The figures about the candidate effects of a diagnosis: their evidence, their curves, and the agreement between flights. A
-//! candidate is an effect that the model may lack. Its evidence is a test statistic, which is compared with a threshold. It is
-//! asserted if the diagnosis concludes that the model lacks it.
+//! The figures about the candidate effects of a diagnosis: their probabilities, their evidence, their curves, and the agreement
+//! between flights. A candidate is an effect that the model may lack. Its evidence is a test statistic, which is compared with a
+//! threshold. It is asserted if the diagnosis concludes that the model lacks it.
 
 use crate::Align::{Left, Right};
 use crate::diagnosis::page::channel_of;
 use crate::diagnosis::place::plain;
 use crate::kit::numbers::{NORMAL_95, interval, number};
 use crate::{
-    Choice, ChoiceOption, Evidence, EvidenceGroup, EvidenceRow, Figure, Section, Style, Table,
-    Whisker, Whiskers, XyBand, XyFigure, XyMark, XySeries,
+    Choice, ChoiceOption, Evidence, EvidenceGroup, EvidenceRow, Figure, Probabilities,
+    ProbabilityRow, Section, Style, Table, Whisker, Whiskers, XyBand, XyFigure, XyMark, XySeries,
 };
 use greylag_sysid::compare::answer::acts_in;
-use greylag_sysid::diagnose::{Candidate, Curve, Diagnosis, Parameter};
+use greylag_sysid::diagnose::{Candidate, Curve, Diagnosis, Explanation, Parameter};
 
 /// Anchor of the figure in the page, for links to it.
 pub(crate) const ANCHOR: &str = "effect";
@@ -21,6 +21,9 @@ const BELOW: usize = 8;
 const CURVES: usize = 3;
 /// Number of measured points above which a plot leaves out some of them.
 const POINTS: usize = 1500;
+/// Sentence on the probabilities of the explanations. The workbench has the same.
+const PROBABLE: &str = "The probability that this is what the model lacks above all: in simulated flights in which that is known, \
+                        statements with 90 % were right in about 90 % (docs/validation/probabilities.md).";
 
 pub(crate) fn ranking(d: &Diagnosis) -> Section {
     let mut seen: Vec<&str> = Vec::new();
@@ -59,8 +62,21 @@ pub(crate) fn ranking(d: &Diagnosis) -> Section {
                 stretches of flight. The threshold is what chance reaches on \
                 resampled flights that lack nothing. A candidate above it is refused if it does not hold on stretches \
                 that the fit did not use, if it is physically impossible, or if the flights disagree.";
-    let figure = Evidence { title: "Evidence against chance".into(), groups };
-    Section::new("Suspects", note, vec![Figure::Evidence(figure)])
+    let evidence = Evidence { title: "Evidence against chance".into(), groups };
+    let figures = probabilities(d).into_iter().chain([Figure::Evidence(evidence)]).collect();
+    Section::new("Suspects", note, figures)
+}
+
+/// The probabilities of the explanations; `None` if the diagnosis states none.
+fn probabilities(d: &Diagnosis) -> Option<Figure> {
+    let listed = d.explanations.iter().filter(|e| e.is_listed());
+    let row = |e: &Explanation| ProbabilityRow {
+        label: e.words().to_string(),
+        probability: e.probability,
+    };
+    let rows: Vec<ProbabilityRow> = listed.map(row).collect();
+    let (title, note) = ("How probable each explanation is".into(), PROBABLE.into());
+    (!rows.is_empty()).then_some(Figure::Probabilities(Probabilities { title, note, rows }))
 }
 
 /// The rows of the asserted effect `found` and of the effects that the data cannot distinguish from it. Adds their ids to `seen`.

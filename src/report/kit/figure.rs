@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::kit::html::escape;
 use crate::{
     AnswerBox, Bars, Choice, Curves, Drawing, Evidence, Findings, Grid, HeatMap, Histogram,
-    Intervals, Table, TimeFigure, Whiskers, XyFigure,
+    Intervals, Probabilities, Table, TimeFigure, Whiskers, XyFigure,
 };
 
 /// One figure of a section.
@@ -39,6 +39,8 @@ pub enum Figure {
     Bars(Bars),
     /// Bars of evidence for effects, with thresholds.
     Evidence(Evidence),
+    /// Bars of the probabilities of explanations.
+    Probabilities(Probabilities),
     /// Values with their intervals.
     Whiskers(Whiskers),
     /// A table of numbers whose cells are coloured by their weight.

@@ -17,6 +17,7 @@ pub(super) mod intervals;
 pub(super) mod loop_timing;
 pub(super) mod numbers;
 pub(super) mod page;
+pub(super) mod probabilities;
 pub(super) mod table;
 pub(super) mod time_figure;
 pub(super) mod time_line;

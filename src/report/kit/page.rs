@@ -150,6 +150,7 @@ impl Figure {
             Figure::Findings(findings) => findings.html(),
             Figure::Bars(bars) => bars.html(),
             Figure::Evidence(evidence) => evidence.html(),
+            Figure::Probabilities(probabilities) => probabilities.html(),
             Figure::Whiskers(whiskers) => whiskers.html(),
             Figure::Grid(grid) => grid.html(),
             Figure::Choice(choice) => choice.html(data),

@@ -62,6 +62,21 @@ impl Explanation {
     fn of(id: &str, kind: Explained, probability: f64) -> Explanation {
         Explanation { id: id.into(), kind, probability }
     }
+
+    /// The explanation in words: the id of an effect, otherwise a phrase.
+    pub fn words(&self) -> &str {
+        match self.kind {
+            Explained::Aircraft | Explained::Installation => &self.id,
+            Explained::Nothing => "nothing is missing that these flights could show",
+            Explained::OtherEffect => "another effect of the catalogue",
+            Explained::Unknown => "something that the catalogue lacks",
+        }
+    }
+
+    /// Whether the explanation is probable enough to be listed.
+    pub fn is_listed(&self) -> bool {
+        self.probability >= LISTED
+    }
 }
 
 /// Probabilities of what the model lacks above all, the largest first. `effects` are the candidates as in a diagnosis, `learnable`
@@ -88,16 +103,8 @@ pub fn explanations(effects: &[Candidate], learnable: f64) -> Vec<Explanation> {
 
 /// Sentence with the probable explanations. `None` if there are none.
 pub fn sentence(explanations: &[Explanation], several: bool) -> Option<String> {
-    let listed = explanations.iter().filter(|e| e.probability >= LISTED);
-    let words = |e: &Explanation| {
-        let name = match e.kind {
-            Explained::Aircraft | Explained::Installation => e.id.as_str(),
-            Explained::Nothing => "nothing is missing that these flights could show",
-            Explained::OtherEffect => "another effect of the catalogue",
-            Explained::Unknown => "something that the catalogue lacks",
-        };
-        format!("{name} {:.0} %", 100.0 * e.probability)
-    };
+    let listed = explanations.iter().filter(|e| e.is_listed());
+    let words = |e: &Explanation| format!("{} {:.0} %", e.words(), 100.0 * e.probability);
     let listed: Vec<String> = listed.map(words).collect();
     let of = if several { " of the first" } else { "" };
     (!listed.is_empty()).then(|| format!("Probability{of}: {}.", listed.join(", ")))
