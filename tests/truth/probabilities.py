@@ -21,6 +21,7 @@ from score import wilson
 EVIDENCE = (-2.0, 6.0)
 LEARNABLE = (1e-3, 1.0)
 UNEXAMINED = 0.5
+HELD_OUT = 0.1
 SIZES = {"LEADING": 5, "ALIKE": 1, "OTHER": 5, "UNKNOWN": 5}
 RIDGE = 0.02
 """Weight of the squares of the weights in the fit, a case: few cases have some of the features."""
@@ -44,7 +45,9 @@ def case_of(r):
     evidence, threshold = r["evidence"][0]
     ratio = float(np.clip(math.log(max((evidence or 0.0) / threshold, 1e-9)), *EVIDENCE))
     unstable = 1.0 - (UNEXAMINED if judged["stable"] is None else judged["stable"])
-    refused, small = judged["status"] == "refused", judged["status"] == "small"
+    slight = judged["held_out"] is not None and judged["held_out"] < HELD_OUT
+    refused = judged["status"] == "refused" and not slight
+    small = judged["status"] == "small" or (judged["status"] == "refused" and slight)
     left = r["learnable"] if "learnable" in r else r["remainder"]
     left = math.log(float(np.clip(left or 0.0, *LEARNABLE)) / LEARNABLE[0])
     lacks = r.get("part") == "without" or bool(r.get("without"))
@@ -58,7 +61,7 @@ def case_of(r):
         label = "nothing"
     else:
         label = "unknown" if lacks else "other"
-    return np.array([1.0, ratio, refused, small, unstable]), np.array([1.0, ratio, refused, small, left]), len(alike), label
+    return np.array([1.0, ratio, refused, small, unstable]), np.array([1.0, ratio, refused, r["verdict"] == "unexplained", left]), len(alike), label
 
 
 def logits(w, case):

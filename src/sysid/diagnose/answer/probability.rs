@@ -8,7 +8,8 @@
 
 use serde::Serialize;
 
-use crate::diagnose::answer::result::{Candidate, Status};
+use crate::diagnose::answer::result::{Candidate, Status, Verdict};
+use crate::diagnose::search::stepwise::HELD_OUT;
 use crate::per_flight::askew;
 
 /// Range of the logarithm of evidence over critical value. Beyond it, more evidence makes an explanation no more probable.
@@ -28,7 +29,7 @@ const LEADING: [f64; 5] = [0.0, 1.0, -1.0, -1.0, -1.0];
 const ALIKE: f64 = -1.0;
 /// Weights of all other effects together: constant, evidence, refused, small, instability.
 const OTHER: [f64; 5] = [-1.0, 0.5, 0.5, 0.0, 1.0];
-/// Weights of what the catalogue lacks: constant, evidence, refused, small, logarithm of the learnable share.
+/// Weights of what the catalogue lacks: constant, evidence, refused, verdict `Unexplained`, logarithm of the learnable share.
 const UNKNOWN: [f64; 5] = [-1.0, 0.5, 1.0, 0.0, 0.5];
 
 /// What may explain the flights.
@@ -79,13 +80,13 @@ impl Explanation {
     }
 }
 
-/// Probabilities of what the model lacks above all, the largest first. `effects` are the candidates as in a diagnosis, `learnable`
+/// Probabilities of what the model lacks above all, the largest first. `verdict` and `effects` are those of a diagnosis, `learnable`
 /// is the share of the residual that a flexible model still removes. Empty if there is no candidate.
 ///
 /// The probabilities assume flights like those to which the weights were fitted: in a third of them nothing is missing.
-pub fn explanations(effects: &[Candidate], learnable: f64) -> Vec<Explanation> {
+pub fn explanations(verdict: Verdict, effects: &[Candidate], learnable: f64) -> Vec<Explanation> {
     let Some(leading) = effects.first() else { return Vec::new() };
-    let logits = logits(leading, learnable);
+    let logits = logits(verdict, leading, learnable);
     let mut all = vec![Explanation::of(&leading.id, kind(&leading.id), logits.leading)];
     all.extend(
         leading
@@ -117,14 +118,18 @@ struct Logits {
     unknown: f64,
 }
 
-fn logits(leading: &Candidate, learnable: f64) -> Logits {
+fn logits(verdict: Verdict, leading: &Candidate, learnable: f64) -> Logits {
     let ratio = (leading.evidence / leading.threshold).max(1e-9).ln();
     let evidence =
         if ratio.is_finite() { ratio.clamp(EVIDENCE[0], EVIDENCE[1]) } else { EVIDENCE[0] };
     let stable = leading.selected_in_bootstraps;
     let instability = 1.0 - if stable.is_finite() { stable } else { UNEXAMINED };
-    let is = |status: Status| f64::from(u8::from(leading.status == status));
-    let (refused, small) = (is(Status::Refused), is(Status::Small));
+    let slight = leading.heldout_error_reduction < HELD_OUT;
+    let small = leading.status == Status::Small || (leading.status == Status::Refused && slight);
+    let refused = leading.status == Status::Refused && !slight;
+    let unexplained = verdict == Verdict::Unexplained;
+    let [refused, small, unexplained] =
+        [refused, small, unexplained].map(|x| f64::from(u8::from(x)));
     let learnable = learnable.max(LEARNABLE[0]).min(LEARNABLE[1]) / LEARNABLE[0];
     let sum = |weights: &[f64; 5], features: [f64; 5]| -> f64 {
         weights.iter().zip(features).map(|(w, x)| w * x).sum()
@@ -133,7 +138,7 @@ fn logits(leading: &Candidate, learnable: f64) -> Logits {
     Logits {
         leading: sum(&LEADING, checked),
         other: sum(&OTHER, checked),
-        unknown: sum(&UNKNOWN, [1.0, evidence, refused, small, learnable.ln()]),
+        unknown: sum(&UNKNOWN, [1.0, evidence, refused, unexplained, learnable.ln()]),
     }
 }
 

@@ -98,7 +98,7 @@ fn of_unknown(
     let (verdict, why_unknown) = spoken(&found, &doubtful, &channels, faultless);
     let explanations = match verdict {
         Verdict::Unknown => Vec::new(),
-        _ => probability::explanations(&effects, found.learnable()),
+        _ => probability::explanations(verdict, &effects, found.learnable()),
     };
     notes.extend(sentences::notes(&found, model, verdict, options));
     let decoys = match options.detail {
