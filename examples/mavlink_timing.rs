@@ -6,9 +6,10 @@
 //! The example flies for one minute in real time, then for five minutes of flight time in lockstep. It prints the results and
 //! fails if a requirement is not met. The machine must be idle. `--controller hybrid` flies a planner, and late plans are
 //! counted. `--planner KEY=VALUE` changes the planner's settings. `--load 2` keeps two threads busy during the flight. Plans
-//! may then be late, but the attitude must be held.
+//! may then be late, but the attitude must be held. `--realtime` gives the companion's threads real-time priority.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
+use std::panic::resume_unwind;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -23,7 +24,9 @@ use greylag::control::cem::Change;
 use greylag::control::{self, ControllerKind, Target, build};
 use greylag::flight::pilot::{Config, Pilot};
 use greylag::flight::recorder::Place;
-use greylag::flight::runtime::{Companion, Flight, FlightOptions, Pace, Placement, Summary};
+use greylag::flight::runtime::{
+    Companion, Flight, FlightError, FlightOptions, Pace, Placement, Summary, take_real_time,
+};
 use greylag::link::autopilot::Mode;
 use greylag::link::offboard::{Heard, OffboardClient};
 use greylag::logs::Sample;
@@ -73,10 +76,13 @@ struct Arguments {
     /// Number of threads that are kept busy during the flight.
     #[arg(long, default_value_t = 0)]
     load: usize,
+    /// Run the companion's threads with real-time priority (SCHED_FIFO), as `greylag fly --realtime`.
+    #[arg(long)]
+    realtime: bool,
 }
 
 fn main() -> Result<ExitCode> {
-    let Arguments { controller: kind, planner: changes, load } = Arguments::parse();
+    let Arguments { controller: kind, planner: changes, load, realtime } = Arguments::parse();
     let model = fly::model(Path::new(fly::MODEL), None)?;
     let in_process = settled_in_process(kind, &model, &changes)?;
     println!(
@@ -84,11 +90,12 @@ fn main() -> Result<ExitCode> {
          threads\n"
     );
     let busy = Busy::start(load)?;
-    let real = flight(kind, &model, &changes, Pace::RealTime, REAL_TIME_S)?;
+    let begin: Begin = if realtime { start_in_real_time } else { Flight::start };
+    let real = flight(kind, &model, &changes, (Pace::RealTime, REAL_TIME_S), begin)?;
     drop(busy);
     let mut verdicts = real_time(&real, kind, load, in_process)?;
     if load == 0 {
-        let lockstep = flight(kind, &model, &changes, Pace::Lockstep, LOCKSTEP_S)?;
+        let lockstep = flight(kind, &model, &changes, (Pace::Lockstep, LOCKSTEP_S), begin)?;
         let speed = lockstep.shim.flown_s / lockstep.shim.wall_s;
         let errors = settled(&lockstep.samples)?;
         verdicts.push((near(errors, in_process), format!("lockstep: settled {}", told(errors))));
@@ -228,20 +235,36 @@ fn error_at_end(samples: &[Sample]) -> f64 {
     (rmse(0, ROLL_DEG) + rmse(1, PITCH_DEG)) / 2.0
 }
 
+/// Starts the companion of a flight.
+type Begin = fn(&FlightOptions, Companion, Arc<AtomicBool>) -> Result<Flight, FlightError>;
+
+/// Starts the companion with real-time priority. Simulator, client and busy threads keep the usual class.
+fn start_in_real_time(
+    options: &FlightOptions,
+    companion: Companion,
+    stop: Arc<AtomicBool>,
+) -> Result<Flight, FlightError> {
+    let start = || {
+        take_real_time().map_err(|why| FlightError::Thread("companion", why))?;
+        Flight::start(options, companion, stop)
+    };
+    // the threads of the flight inherit the class of the thread that starts them
+    thread::scope(|scope| scope.spawn(start).join().unwrap_or_else(|died| resume_unwind(died)))
+}
+
 /// Flies the target in OFFBOARD until the shim has flown `seconds`.
 fn flight(
     kind: ControllerKind,
     model: &GreyBox,
     changes: &[Change],
-    pace: Pace,
-    seconds: f64,
+    (pace, seconds): (Pace, f64),
+    begin: Begin,
 ) -> Result<Flown> {
     let room = tempfile::tempdir()?;
     let folder = room.path().join("flight");
     let stop = Arc::new(AtomicBool::new(false));
     let options = options(model, pace, &folder)?;
-    let companion =
-        Flight::start(&options, companion_with(kind, model, changes, pace)?, stop.clone())?;
+    let companion = begin(&options, companion_with(kind, model, changes, pace)?, stop.clone())?;
     let vehicle = companion.vehicle.context("no vehicle link")?;
     let client = companion.clients.first().copied().flatten().context("no client link")?;
     let simulator = simulate(vehicle, pace, seconds, stop.clone())?;
