@@ -168,7 +168,7 @@ fn calm(problem: &Problem, found: &mut Found, from: usize) -> Result<(), Reconst
         if iteration < FIRST {
             continue;
         }
-        let change = found.levels.renew(&solved.readings, log.step);
+        let change = found.levels.renew(&solved.residuals, log.step);
         let change = change.max(found.levels.loosen(&problem.step_residuals(found)));
         if iteration > from.max(FIRST) && moved < STEP_TOLERANCE && change < LEVEL_TOLERANCE {
             break;
@@ -189,7 +189,7 @@ fn search(
     solved: &Solved<MOTION>,
     bound: f64,
 ) -> Result<f64, ReconstructError> {
-    let before = problem.merit(found, bound, Some(solved.readings.as_slice()));
+    let before = problem.merit(found, bound, Some(solved.residuals.as_slice()));
     let mut part = 1.0;
     while part >= LEAST_PART {
         let mut trial = found.clone();
