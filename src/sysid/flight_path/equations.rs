@@ -281,8 +281,9 @@ impl Problem<'_> {
     }
 }
 
-/// If a flight has more instants than this, the back substitution recomputes equations instead of storing them.
-const HELD: usize = 100_000;
+/// If a flight has more instants than this, the back substitution recomputes equations instead of storing them, and fits are made
+/// again instead of being kept.
+pub const HELD: usize = 100_000;
 
 /// Huber's loss of a residual in standard deviations: quadratic up to `bound`, then linear.
 fn huber(size: f64, bound: f64) -> f64 {
