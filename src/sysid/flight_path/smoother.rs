@@ -80,9 +80,9 @@ fn first(problem: &Problem) -> Result<Found, ReconstructError> {
     Ok(found)
 }
 
-/// Fits again from the first fit, which is without rare errors of the sensors, if gusts are strong. Errors of the air-data sensors keep
-/// their prior means and standard deviations, because gusts bias their estimates. Any other error must be beyond doubt with the
-/// standard deviation that gusts give it, too.
+/// Fits again from the first fit, which is without rare errors of the sensors, if gusts are strong. Errors of the air-data sensors
+/// keep their prior means and standard deviations, because gusts bias their estimates. Any other error must be beyond doubt with
+/// the standard deviation that gusts give it, too.
 fn in_gusts(problem: &Problem) -> Result<Found, ReconstructError> {
     let singular = || no_path(&problem.options.name, "the equations became singular");
     let mut held = calibration::OF_AIR.to_vec();
@@ -90,7 +90,7 @@ fn in_gusts(problem: &Problem) -> Result<Found, ReconstructError> {
     let mut before: Option<Found> = None;
     loop {
         let (mut freed, mut found) = (*problem, before.take().map_or_else(|| first(problem), Ok)?);
-        // of a long flight the first fit is rather made again, should it be needed, than kept
+        // the first fit of a long flight is made again where a second round needs it: a copy would take much memory
         before = (!long).then(|| found.clone());
         for place in calibration::OF_AIR {
             freed.widths[place] = nuisance::exact(place, freed.widths[place]);

@@ -79,8 +79,8 @@ impl Problem<'_> {
     ) -> Option<(Path, Vec<[f64; 3]>)> {
         let (moves, noise) = self.moves::<N>(track, path, found, random)?;
         let level = found.levels.gyro;
-        let of = |unit: &[f64; N]| std::array::from_fn(|i| level[i] * unit[i]);
-        let gyro: Vec<[f64; 3]> = noise.iter().map(of).collect();
+        let of = |unit: &[f64; N]| -> [f64; 3] { std::array::from_fn(|i| level[i] * unit[i]) };
+        let gyro = noise.iter().map(of).collect();
         drop(noise);
         // the path is copied last: the equations of a long flight are large, too
         let mut erring = path.clone();
