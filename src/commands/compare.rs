@@ -22,7 +22,9 @@ use crate::report::ComparisonReport;
 #[cfg(feature = "study")]
 use crate::sysid::amend::Origin;
 use crate::sysid::compare::answer::multiple;
-use crate::sysid::compare::{Answer, Comparison, HorizonScore, ModelResult, Options, compare};
+use crate::sysid::compare::{
+    Answer, Comparison, HorizonScore, ModelResult, Options, compare, compare_and_drop,
+};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
@@ -94,9 +96,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     distinct(&arguments.logs.paths, &[])?;
     let Intake { flights, mut notes, mut in_doubt, .. } =
         arguments.logs.take_in(&models[0], clock)?;
-    let options = Options { horizons_s: arguments.horizons.clone(), seed: arguments.seed };
     let bar = Bar::new();
-    let mut comparison = compare(&models, &flights, &options, &|stage| bar.update(stage))?;
+    let (mut comparison, flights) = compared(arguments, &models, flights, &bar)?;
     bar.go_on()?;
     drop(bar);
     in_doubt |= comparison.flights.len() < arguments.logs.paths.len();
@@ -120,6 +121,35 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
+/// The comparison of `models` with `flights`, and the flights if they are needed after it.
+fn compared(
+    arguments: &Arguments,
+    models: &[GreyBox],
+    flights: Vec<Reconstruction>,
+    bar: &Bar,
+) -> Result<(Comparison, Vec<Reconstruction>)> {
+    let options = Options { horizons_s: arguments.horizons.clone(), seed: arguments.seed };
+    if arguments.predictions.is_some() || origin(arguments, models).is_some() {
+        let found = compare(models, &flights, &options, &|stage| bar.update(stage))?;
+        return Ok((found, flights));
+    }
+    let found = compare_and_drop(models, flights, &options, &|stage| bar.update(stage))?;
+    Ok((found, Vec::new()))
+}
+
+/// The origin of the second of two models, if it was amended from the first.
+#[cfg(feature = "study")]
+fn origin(arguments: &Arguments, models: &[GreyBox]) -> Option<Origin> {
+    let ([before, _], [_, after]) = (models, &arguments.models[..]) else { return None };
+    Origin::beside(&files::shipped(after), before)
+}
+
+/// `None`: a build without the feature `study` cannot read the files of an amendment.
+#[cfg(not(feature = "study"))]
+fn origin(_: &Arguments, _: &[GreyBox]) -> Option<()> {
+    None
+}
+
 /// The summary for a model and its refit by `greylag amend` (an amendment). It separates the change of the error by re-estimated
 /// coefficients from the change by added effects (physical contributions to forces and moments). `None` unless there are two
 /// models and the second was amended from the first.
@@ -130,8 +160,9 @@ fn traced(
     flights: &[Reconstruction],
     comparison: &Comparison,
 ) -> Result<Option<Answer>> {
-    let ([before, _], [_, after]) = (models, &arguments.models[..]) else { return Ok(None) };
-    let Some(origin) = Origin::beside(&files::shipped(after), before) else { return Ok(None) };
+    let Some((origin, before)) = origin(arguments, models).zip(models.first()) else {
+        return Ok(None);
+    };
     let tuned = origin.tuned(before).unwrap_or_else(|| before.clone());
     let errors = crate::sysid::compare::scores(&tuned, flights, &arguments.horizons)?;
     let shares = crate::sysid::compare::shares(&tuned, flights).ok();

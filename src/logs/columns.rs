@@ -7,8 +7,11 @@ pub(super) type Get = fn(&Sample) -> f64;
 /// Function that gives mutable access to the value of a column in a sample.
 pub(super) type Place = fn(&mut Sample) -> &mut f64;
 
-/// The columns of the format in the order in which they are written: name, read access, mutable access.
-pub(super) const COLUMNS: [(&str, Get, Place); 29] = [
+/// A column of the format: name, read access, mutable access.
+pub(super) type Column = (&'static str, Get, Place);
+
+/// The columns of the format in the order in which they are written.
+pub(super) const COLUMNS: [Column; 29] = [
     ("time_s", |s| s.time_s, |s| &mut s.time_s),
     ("roll_rad", |s| s.attitude_rad[0], |s| &mut s.attitude_rad[0]),
     ("pitch_rad", |s| s.attitude_rad[1], |s| &mut s.attitude_rad[1]),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::BufRead;
 use std::path::Path;
 
-use super::columns::{BLOCK, COLUMNS, EITHER};
+use super::columns::{BLOCK, COLUMNS, Column, EITHER};
 use super::csv::{self, CsvError, Raw};
 use super::error::LogError;
 use super::finding::{Finding, named};
@@ -14,7 +14,7 @@ use super::phases::Flying;
 use super::quality::Quality;
 use super::stretches::Keep;
 use super::topics::period_s;
-use super::{Flight, Format, assess, derive, screening};
+use super::{Flight, Format, Sample, assess, derive, screening};
 
 /// Reads the flights of a CSV table, one for each recording in it.
 ///
@@ -158,16 +158,6 @@ fn lacks(path: &Path, missing: &[CsvError], unknown: &[String]) -> Finding {
 
 /// A channel for each column of the table that has values.
 fn channels(raw: &Raw, mapping: &Mapping, entries: &BTreeMap<String, Entry>) -> Vec<Channel> {
-    let mut seen = vec![[Vec::new(), Vec::new()]; COLUMNS.len()];
-    for block in raw.rows.chunks(BLOCK) {
-        for ([times, values], (_, get, _)) in seen.iter_mut().zip(COLUMNS).skip(1) {
-            let there = block.iter().map(|s| (s.time_s, get(s))).filter(|(_, x)| x.is_finite());
-            for (time, value) in there {
-                times.push(time);
-                values.push(value);
-            }
-        }
-    }
     let channel = |name: &str, [times, values]: [Vec<f64>; 2]| {
         let period = period_s(&times);
         let mut quality = Quality::at(name, &times, &values, period);
@@ -183,6 +173,26 @@ fn channels(raw: &Raw, mapping: &Mapping, entries: &BTreeMap<String, Entry>) -> 
             quality,
         })
     };
-    let all = seen.into_iter().zip(COLUMNS).skip(1);
-    all.filter_map(|(seen, (name, ..))| channel(name, seen)).collect()
+    let columns: &[Column] = &COLUMNS;
+    let groups = columns[1..].chunks(AT_ONCE);
+    let all = groups.flat_map(|group| group.iter().zip(seen(&raw.rows, group)));
+    all.filter_map(|(column, seen)| channel(column.0, seen)).collect()
+}
+
+/// Number of columns whose values are in memory at a time: those of all columns would take more memory than a long table.
+const AT_ONCE: usize = 7;
+
+/// Times (s) and values of the samples in each of the columns `group`.
+fn seen(rows: &[Sample], group: &[Column]) -> Vec<[Vec<f64>; 2]> {
+    let mut seen = vec![[Vec::new(), Vec::new()]; group.len()];
+    for block in rows.chunks(BLOCK) {
+        for ([times, values], (_, get, _)) in seen.iter_mut().zip(group) {
+            let there = block.iter().map(|s| (s.time_s, get(s))).filter(|(_, x)| x.is_finite());
+            for (time, value) in there {
+                times.push(time);
+                values.push(value);
+            }
+        }
+    }
+    seen
 }

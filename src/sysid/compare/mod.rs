@@ -25,6 +25,7 @@ mod run;
 mod runs;
 mod sentence;
 mod unexplained;
+mod usable;
 mod verdict;
 
 pub use crate::weak_form::channels::{ChannelId, RegimeVariable};
@@ -35,7 +36,7 @@ pub use result::{
     GrowthPoint, HorizonScore, KnownUse, Map, MapCell, ModelResult, ModelTrace, NuisanceResult,
     Regime, RegimeBins, Settings, StateScore,
 };
-pub use run::{Options, abstentions, compare, scores};
+pub use run::{Options, abstentions, compare, compare_and_drop, scores};
 pub use unexplained::{Shares, shares};
 #[cfg(feature = "study")]
 pub(crate) use verdict::unpredicted;

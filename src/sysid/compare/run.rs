@@ -19,6 +19,7 @@ use super::result::{
     RegimeBins, Settings,
 };
 use super::sentence::{NOTHING_LEFT, Subject, sentence};
+use super::usable::{self, Usable, usable};
 use super::verdict;
 use crate::flight_path::reconstruction::Reconstruction;
 use crate::per_flight::known::KnownFlight;
@@ -60,12 +61,44 @@ pub fn compare(
     options: &Options,
     progress: &Progress,
 ) -> Result<Comparison, CompareError> {
+    let usable = usable(flights, slowest(models, options)?)?;
+    compared(models, flights, usable, options, progress)
+}
+
+/// As [`compare`], for flights that nothing needs afterwards. The samples of a flight are dropped once they are resampled, because
+/// both would take much memory for a long flight.
+/// # Errors
+/// Those of [`compare`].
+pub fn compare_and_drop(
+    models: &[GreyBox],
+    mut flights: Vec<Reconstruction>,
+    options: &Options,
+    progress: &Progress,
+) -> Result<Comparison, CompareError> {
+    let (places, prepared, notes) = usable::emptied(&mut flights, slowest(models, options)?)?;
+    let used = places.into_iter().map(|place| &flights[place]).collect();
+    compared(models, &flights, (used, prepared, notes), options, progress)
+}
+
+/// Airspeed above which the aircraft of the first of `models` counts as flying, m/s. An error if there is no model or a horizon is
+/// not usable.
+fn slowest(models: &[GreyBox], options: &Options) -> Result<f64, CompareError> {
     let first = models.first().ok_or(CompareError::NoModel)?;
-    if let Some(h) = options.horizons_s.iter().find(|h| !(0.01..=600.0).contains(*h)) {
-        return Err(CompareError::Horizon(*h));
+    match options.horizons_s.iter().find(|h| !(0.01..=600.0).contains(*h)) {
+        Some(horizon) => Err(CompareError::Horizon(*horizon)),
+        None => Ok(first.airframe.envelope.flying_from_mps()),
     }
-    let slowest = first.airframe.envelope.flying_from_mps();
-    let (used, prepared, mut notes) = usable(flights, slowest)?;
+}
+
+/// Compares each of `models` with the usable ones among `flights`.
+fn compared(
+    models: &[GreyBox],
+    flights: &[Reconstruction],
+    (used, prepared, mut notes): Usable,
+    options: &Options,
+    progress: &Progress,
+) -> Result<Comparison, CompareError> {
+    let first = models.first().ok_or(CompareError::NoModel)?;
     notes.extend(short_of(&prepared, &options.horizons_s));
     let steps: Vec<(&str, f64)> = prepared.iter().map(|f| (f.name.as_str(), f.dt)).collect();
     notes.extend(free_run::uneven(&steps, &options.horizons_s));
@@ -120,56 +153,6 @@ pub fn scores(
         flights.iter().map(|f| Prepared::new(f, slowest)).collect::<Result<Vec<_>, _>>()?;
     let (runs, _) = free_run::fly(model, &prepared, horizons_s);
     Ok(horizons_s.iter().map(|h| runs.score(*h)).collect())
-}
-
-pub(super) type Usable<'a> = (Vec<&'a Reconstruction>, Vec<Prepared>, Vec<String>);
-
-/// The flights that can be compared, and notes on the others. An aircraft counts as flying above the airspeed `slowest` (m/s).
-pub(super) fn usable(flights: &[Reconstruction], slowest: f64) -> Result<Usable<'_>, CompareError> {
-    if flights.is_empty() {
-        return Err(CompareError::NoLog);
-    }
-    let (mut used, mut prepared, mut notes) = (Vec::new(), Vec::new(), Vec::new());
-    for flight in flights {
-        let ready = Prepared::new(flight, slowest)?;
-        if ready.windows.is_empty() {
-            notes.push(why_unusable(flight, slowest));
-            continue;
-        }
-        if !ready.has_force() {
-            notes.push(format!(
-                "{}: no accelerometers, so its forces D, L, Y are skipped; the rates of V, α and β stand in for them with less power",
-                flight.name
-            ));
-        }
-        if flight.noise.iter().chain(&flight.force_noise).all(|sd| !sd.is_finite()) {
-            notes.push(format!(
-                "{}: the sensors' noise is not known, so the whole residual counts as unexplained",
-                flight.name
-            ));
-        }
-        used.push(flight);
-        prepared.push(ready);
-    }
-    if prepared.is_empty() {
-        return Err(CompareError::NoFlight(notes.join("; ")));
-    }
-    Ok((used, prepared, notes))
-}
-
-fn why_unusable(flight: &Reconstruction, slowest: f64) -> String {
-    let speeds = flight.segments.iter().flat_map(|s| &s.instants).map(|i| i.state.airspeed);
-    match speeds.filter(|v| v.is_finite()).fold(f64::NAN, f64::max) {
-        fastest if fastest.is_nan() => format!("{}: holds no usable sample", flight.name),
-        fastest if fastest < slowest => format!(
-            "{}: no flight in it, the airspeed never exceeds {fastest:.1} m/s where flying begins at {slowest:.1} m/s",
-            flight.name
-        ),
-        _ => format!(
-            "{}: no stretch of {KERNEL_S} s in the air without a gap or a missing actuator",
-            flight.name
-        ),
-    }
 }
 
 fn short_of(flights: &[Prepared], horizons: &[f64]) -> Vec<String> {

@@ -11,8 +11,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::flight_path::nuisance::SKEW_SAMPLES;
-use crate::flight_path::reconstruction::{Instant, Segment};
+use crate::flight_path::reconstruction::Instant;
 use greylag_logs::Sampling;
+use greylag_physics::State;
 
 /// Length of the averaging kernel, s.
 const KERNEL: f64 = 0.15;
@@ -46,11 +47,29 @@ pub struct Skew {
 /// Delays estimated from roll alone and from pitch alone; `None` if the axis does not determine the delay.
 pub type ByAxis = [Option<Skew>; 2];
 
+/// A sample with the quantities on which the moments depend.
+pub trait Moving {
+    /// The state of the flight.
+    fn state(&self) -> &State;
+    /// Deflections of aileron and elevator, rad.
+    fn deflections(&self) -> [f64; 2];
+}
+
+impl Moving for Instant {
+    fn state(&self) -> &State {
+        &self.state
+    }
+
+    fn deflections(&self) -> [f64; 2] {
+        [self.controls.aileron, self.controls.elevator]
+    }
+}
+
 /// Delays of the recorded deflections, estimated from roll alone and from pitch alone. `step` is the sampling interval, s.
-pub fn by_axis(segments: &[Segment], step: f64, sampling: Sampling) -> ByAxis {
+pub fn by_axis<I: Moving>(segments: &[&[I]], step: f64, sampling: Sampling) -> ByAxis {
     [
-        from_axis(segments, step, sampling, |i| i.state.p, roll_terms),
-        from_axis(segments, step, sampling, |i| i.state.q, pitch_terms),
+        from_axis(segments, step, sampling, |i: &I| i.state().p, roll_terms::<I>),
+        from_axis(segments, step, sampling, |i: &I| i.state().q, pitch_terms::<I>),
     ]
 }
 
@@ -94,26 +113,28 @@ fn extrapolated(skew: Skew, again: &[f64]) -> Skew {
 }
 
 /// Regressors of the roll acceleration. The last one is proportional to the deflection.
-fn roll_terms(i: &Instant) -> [f64; 7] {
-    let (s, v) = (&i.state, i.state.airspeed);
+fn roll_terms<I: Moving>(i: &I) -> [f64; 7] {
+    let (s, [aileron, _]) = (i.state(), i.deflections());
+    let v = s.airspeed;
     let v2 = v * v;
-    [v2, v2 * s.beta, v * s.p, v * s.r, s.p * s.q, s.q * s.r, v2 * i.controls.aileron]
+    [v2, v2 * s.beta, v * s.p, v * s.r, s.p * s.q, s.q * s.r, v2 * aileron]
 }
 
 /// Regressors of the pitch acceleration. The last one is proportional to the deflection.
-fn pitch_terms(i: &Instant) -> [f64; 6] {
-    let (s, v) = (&i.state, i.state.airspeed);
+fn pitch_terms<I: Moving>(i: &I) -> [f64; 6] {
+    let (s, [_, elevator]) = (i.state(), i.deflections());
+    let v = s.airspeed;
     let v2 = v * v;
     let coupling = s.p * s.p - s.r * s.r;
-    [v2, v2 * s.alpha, v * s.q, s.p * s.r, coupling, v2 * i.controls.elevator]
+    [v2, v2 * s.alpha, v * s.q, s.p * s.r, coupling, v2 * elevator]
 }
 
-fn from_axis<const T: usize>(
-    segments: &[Segment],
+fn from_axis<I, const T: usize>(
+    segments: &[&[I]],
     step: f64,
     sampling: Sampling,
-    rate: fn(&Instant) -> f64,
-    terms: fn(&Instant) -> [f64; T],
+    rate: fn(&I) -> f64,
+    terms: fn(&I) -> [f64; T],
 ) -> Option<Skew> {
     let half = ((KERNEL / step / 2.0).round() as usize).max(3);
     let kernel: Vec<f64> = (0..=2 * half)
@@ -123,8 +144,7 @@ fn from_axis<const T: usize>(
         })
         .collect();
     let (mut rows, mut values) = (Vec::new(), Vec::new());
-    for segment in segments {
-        let instants = &segment.instants[..];
+    for &instants in segments {
         let terms = |k: usize| held(instants, k, sampling, terms);
         let (mut of_terms, mut of_rates) = (Vec::new(), Vec::new());
         let mut middle = half + 1;
@@ -142,11 +162,11 @@ fn from_axis<const T: usize>(
 }
 
 /// Regressors averaged over the interval from sample `k` to the next sample.
-fn held<const T: usize>(
-    instants: &[Instant],
+fn held<I, const T: usize>(
+    instants: &[I],
     k: usize,
     sampling: Sampling,
-    terms: fn(&Instant) -> [f64; T],
+    terms: fn(&I) -> [f64; T],
 ) -> [f64; T] {
     let own = terms(&instants[k]);
     match sampling {

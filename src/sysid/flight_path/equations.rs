@@ -15,7 +15,7 @@ use crate::flight_path::calibration::Suspect;
 use crate::flight_path::intake::{Log, Track};
 use crate::flight_path::kinematics::{Drive, MOTION, MOTION_AND_GUST};
 use crate::flight_path::levels::Levels;
-use crate::flight_path::measurement::{self, AT, Others, Predicted, Reading};
+use crate::flight_path::measurement::{AT, Instruments, Others, PIECE, Residuals};
 use crate::flight_path::nuisance::{self, COUNT, INERTIAL, Values, WIND};
 use crate::flight_path::path::{CHANNELS, Path};
 use crate::flight_path::{Options, ReconstructError, noise};
@@ -69,7 +69,7 @@ pub struct Solved<const N: usize> {
     /// Standard deviations of the constants; zero if they are held.
     pub deviations: Values,
     /// Residuals (measured − predicted values) before the change, for every stretch.
-    pub readings: Vec<Vec<Reading>>,
+    pub residuals: Vec<Vec<Residuals>>,
 }
 
 impl Problem<'_> {
@@ -85,13 +85,13 @@ impl Problem<'_> {
     }
 
     /// The function that the line search minimises: −2 ln L of the path and the constants, where L is the likelihood with the
-    /// prior. The noise levels are fixed, and terms that depend only on them are left out. `readings` are those of `found`, for
+    /// prior. The noise levels are fixed, and terms that depend only on them are left out. `residuals` are those of `found`, for
     /// each stretch, if they are known.
-    pub fn merit(&self, found: &Found, bound: f64, readings: Option<&[Vec<Reading>]>) -> f64 {
+    pub fn merit(&self, found: &Found, bound: f64, residuals: Option<&[Vec<Residuals>]>) -> f64 {
         let before = |i: usize| ((found.values[i] - self.means[i]) / self.widths[i]).powi(2);
         let pairs = self.log.tracks.par_iter().zip(&found.paths).enumerate();
         let one = |(k, pair): (usize, (&Track, &Path))| {
-            self.misfit_of(pair, found, bound, readings.map(|all| all[k].as_slice()))
+            self.misfit_of(pair, found, bound, residuals.map(|all| all[k].as_slice()))
         };
         let tracks: Vec<f64> = pairs.map(one).collect();
         tracks.iter().sum::<f64>() + (0..COUNT).map(before).sum::<f64>()
@@ -102,28 +102,29 @@ impl Problem<'_> {
         (track, path): (&Track, &Path),
         found: &Found,
         bound: f64,
-        readings: Option<&[Reading]>,
+        residuals: Option<&[Residuals]>,
     ) -> f64 {
         let (step, gravity) = (self.log.step, self.options.gravity);
         let (values, l) = (&found.values, &found.levels);
         let spread: [f64; CHANNELS] = std::array::from_fn(|i| l.measured[i] * l.colour[i]);
-        let of = |r: &Reading| -> f64 {
-            let sizes = (0..CHANNELS).map(|i| (r.residual[i] / spread[i]).abs());
+        let of = |residuals: &Residuals| -> f64 {
+            let sizes = (0..CHANNELS).map(|i| (residuals[i] / spread[i]).abs());
             sizes.filter(|size| !size.is_nan()).map(|size| huber(size, bound)).sum()
         };
-        let measured: f64 = match readings {
-            Some(readings) => readings.iter().map(of).sum(),
+        let measured: f64 = match residuals {
+            Some(residuals) => residuals.iter().map(of).sum(),
             None => {
                 // the readings of a long flight would take much memory
                 let vanes_at = self.log.sensors.vanes_at();
-                let predicted = Predicted::new(track, path, values, step, vanes_at);
-                (0..path.len()).map(|k| of(&predicted.reading(k))).sum()
+                let sensors = Instruments { track, values, step, vanes_at };
+                let pieces = (0..path.len()).step_by(PIECE);
+                pieces.flat_map(|from| sensors.residuals(path, from, PIECE)).map(|r| of(&r)).sum()
             }
         };
         let drive = Drive::new(track, values, step, self.sampling, gravity);
         let sd = step_deviations::<MOTION>(l, step);
         let between = (0..path.len().saturating_sub(1)).map(|k| {
-            let left = drive.step::<MOTION, 1>(path, values, k, step, gravity).rest;
+            let left = drive.step::<MOTION, 1>(path, k).rest;
             (0..MOTION).map(|i| huber((left[i][0] / sd[i]).abs(), PROCESS * bound)).sum::<f64>()
         });
         measured + between.sum::<f64>()
@@ -139,7 +140,7 @@ impl Problem<'_> {
         for (track, path) in self.log.tracks.iter().zip(&found.paths) {
             let drive = Drive::new(track, &found.values, step, self.sampling, gravity);
             for k in 0..path.len().saturating_sub(1) {
-                let rest = drive.step::<MOTION, 1>(path, &found.values, k, step, gravity).rest;
+                let rest = drive.step::<MOTION, 1>(path, k).rest;
                 (0..MOTION).for_each(|i| left[i].push(rest[i][0] / sd[i]));
             }
         }
@@ -149,18 +150,21 @@ impl Problem<'_> {
     /// Slow differences between measured and estimated roll, pitch and yaw, rad. The differences are averaged over blocks of
     /// `block` (s), and the root mean square of these means is returned. It is 0 for an angle that is not measured.
     pub fn slow_disagreement(&self, found: &Found, block: f64) -> [f64; 3] {
-        let vanes_at = self.log.sensors.vanes_at();
+        let (step, vanes_at) = (self.log.step, self.log.sensors.vanes_at());
+        let length = (block / step).ceil() as usize;
+        let piece = length * (PIECE / length).max(1);
         let mut sums = [(0.0, 0.0); 3];
         for (track, path) in self.log.tracks.iter().zip(&found.paths) {
-            let readings =
-                measurement::readings(track, path, &found.values, self.log.step, vanes_at);
-            for block in readings.chunks((block / self.log.step).ceil() as usize) {
-                for (channel, (sum, count)) in sums.iter_mut().enumerate() {
-                    let residuals = block.iter().map(|r| r.residual[channel]);
-                    let residuals: Vec<f64> = residuals.filter(|x| x.is_finite()).collect();
-                    if !residuals.is_empty() {
-                        *sum += statistics::mean(&residuals).powi(2);
-                        *count += 1.0;
+            let sensors = Instruments { track, values: &found.values, step, vanes_at };
+            for from in (0..path.len()).step_by(piece) {
+                for block in sensors.residuals(path, from, piece).chunks(length) {
+                    for (channel, (sum, count)) in sums.iter_mut().enumerate() {
+                        let residuals = block.iter().map(|residuals| residuals[channel]);
+                        let residuals: Vec<f64> = residuals.filter(|x| x.is_finite()).collect();
+                        if !residuals.is_empty() {
+                            *sum += statistics::mean(&residuals).powi(2);
+                            *count += 1.0;
+                        }
                     }
                 }
             }
@@ -238,8 +242,8 @@ impl Problem<'_> {
         }
         let solved = stretches.par_iter().map(|(along, stretch)| stretch.substitute(along, &by));
         let moves = solved.collect::<Option<_>>()?;
-        let readings = stretches.into_iter().map(|(along, _)| along.readings).collect();
-        Some(Solved { moves, constants, deviations, readings })
+        let residuals = stretches.into_iter().map(|(along, _)| along.residuals()).collect();
+        Some(Solved { moves, constants, deviations, residuals })
     }
 
     /// Equations of the constants alone, after the elimination of the paths.
@@ -277,8 +281,9 @@ impl Problem<'_> {
     }
 }
 
-/// If a flight has more instants than this, the back substitution recomputes equations instead of storing them.
-const HELD: usize = 100_000;
+/// If a flight has more instants than this, the back substitution recomputes equations instead of storing them, and fits are made
+/// again instead of being kept.
+pub const HELD: usize = 100_000;
 
 /// Huber's loss of a residual in standard deviations: quadratic up to `bound`, then linear.
 fn huber(size: f64, bound: f64) -> f64 {

@@ -4,12 +4,14 @@ mod channels;
 mod stretches;
 mod track;
 
+use std::borrow::Borrow;
+
 use crate::flight_path::channel::Channel;
 use crate::flight_path::{Options, ReconstructError, lever_arm};
 use channels::Channels;
 use greylag_logs::rudder::RudderMotion;
 use greylag_logs::{Flight, FlowAngles};
-use greylag_physics::{Command, Controls, Sensors};
+use greylag_physics::Sensors;
 use stretches::{gap, step, stretches};
 use track::track;
 
@@ -105,10 +107,10 @@ pub struct Track {
     pub altitude: Vec<f64>,
     /// Air density; never missing.
     pub density: Vec<f64>,
-    /// Last command at or before each sample; `None` if commands are not logged.
-    pub commands: Vec<Option<Command>>,
-    /// Deflections and throttle position; never missing.
-    pub controls: Vec<Controls>,
+    /// Last command at or before each sample: aileron, elevator, throttle, rudder.
+    pub commands: Vec<[f64; 4]>,
+    /// Deflections of aileron and elevator, throttle position and deflection of the rudder; never missing.
+    pub controls: Vec<[f64; 4]>,
 }
 
 impl Track {
@@ -123,11 +125,13 @@ impl Track {
     }
 }
 
-/// Converts a log to tracks: splits it at gaps, interpolates the measurements, and holds each command until the next one.
+/// Converts a log to tracks: splits it at gaps, interpolates the measurements, and holds each command until the next one. A flight
+/// that is passed by value is dropped before the tracks are made.
 ///
 /// # Errors
 /// If a required channel is missing, the log contains no flight, or no stretch can be used.
-pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructError> {
+pub fn take_in(log: impl Borrow<Flight>, options: &Options) -> Result<Log, ReconstructError> {
+    let flight: &Flight = log.borrow();
     let channels = Channels::of(flight);
     channels.check(&options.name)?;
     let has = channels.sensors();
@@ -148,6 +152,7 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
     let rudder = RudderMotion::of(&flight.samples);
     let periods = channels.periods();
     let sensors = options.sensors.overridden_by(&flight.sensors);
+    drop(log);
     let mut log = Log { step, tracks: Vec::new(), has, periods, rudder, sensors, notes };
     let (mut longest, mut left_out) = (0.0_f64, Vec::new());
     for times in &stretches {

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::flight_path::band::{Block, Wide};
 use crate::flight_path::channel::cubic;
-use crate::flight_path::intake::{Span, Track};
+use crate::flight_path::intake::Track;
 use crate::flight_path::levels::GUST_TIME;
 use crate::flight_path::nuisance::{
     self, EARTH, FORCE, FORCE_GAIN, GYRO_GAIN, INERTIAL, SKEW_FORCE, Values,
@@ -13,21 +13,30 @@ use crate::flight_path::path::Path;
 use crate::flight_path::rotation::{self, cross, exp, log};
 use greylag_logs::Sampling;
 
-/// Mean body rates and specific forces over each interval between samples, from gyros and accelerometers.
-#[derive(Clone, Debug)]
-pub struct Drive {
-    /// Mean rate from each sample to the next, body axes, rad/s.
-    rate: Vec<Vector3<f64>>,
-    /// Mean specific force from each sample to the next, body axes at the first sample, m/s².
-    force: Vec<Vector3<f64>>,
-    /// Derivative of `force` with respect to the accelerometers' delay, body axes, m/s³.
-    force_by_skew: Vec<Vector3<f64>>,
+/// Propagation of the path by gyros and accelerometers. The mean rate and specific force of an interval between samples are computed
+/// when they are asked for: lists of them would take much memory in a long flight.
+#[derive(Clone, Copy, Debug)]
+pub struct Drive<'a> {
+    track: &'a Track,
+    values: &'a Values,
+    /// Sampling interval, s.
+    step: f64,
+    sampling: Sampling,
+    /// Gravity, m/s².
+    gravity: f64,
+    has_force: bool,
     /// Correlation time of the gusts, s.
     gust_time: f64,
-    /// Time of the first sample, s.
-    start: f64,
-    /// Extent in time of the flight.
-    span: Span,
+}
+
+/// Means over the interval from a sample to the next one.
+struct Mean {
+    /// Body rate, body axes, rad/s.
+    rate: Vector3<f64>,
+    /// Specific force, body axes at the first sample, m/s².
+    force: Vector3<f64>,
+    /// Derivative of `force` with respect to the accelerometers' delay, body axes, m/s³.
+    force_by_skew: Vector3<f64>,
 }
 
 /// Number of unknowns of an instant: attitude and velocity.
@@ -61,85 +70,85 @@ fn put<const N: usize, const W: usize>(
     }
 }
 
-impl Drive {
+impl<'a> Drive<'a> {
     /// Rates and forces of `track`, corrected for the sensor errors in `values`, for the sampling interval `step` (s) and
     /// `gravity` (m/s²).
     ///
     /// Without accelerometers, the specific force is assumed to keep the velocity constant.
     pub fn new(
-        track: &Track,
-        values: &Values,
+        track: &'a Track,
+        values: &'a Values,
         step: f64,
         sampling: Sampling,
         gravity: f64,
-    ) -> Drive {
-        let n = track.len();
-        let gyro = |k: usize| {
-            Vector3::from(nuisance::without_gain(values, GYRO_GAIN, track.rates[k]))
-                - Vector3::from(nuisance::gyro_bias(values, track.time(k, step), &track.span))
-        };
-        let scaled: Vec<[f64; 3]> =
-            track.force.iter().map(|f| nuisance::without_gain(values, FORCE_GAIN, *f)).collect();
-        let late = values[SKEW_FORCE] / step;
+    ) -> Drive<'a> {
         let has_force = track.force.first().is_some_and(|f| f[0].is_finite());
-        let (start, span) = (track.start, track.span);
-        let [rate, force, force_by_skew] = std::array::from_fn(|_| Vec::with_capacity(n - 1));
-        let gust_time = GUST_TIME;
-        let mut drive = Drive { rate, force, force_by_skew, gust_time, start, span };
-        let (mut before, mut now) = (gyro(0), gyro(0));
-        for k in 0..n - 1 {
-            let after = gyro(k + 1);
-            let (rate, mean): (_, [(Matrix3<f64>, usize, f64); 2]) = match sampling {
-                Sampling::Held => {
-                    let back = exp(&(before * -step));
-                    (now, [(Matrix3::identity(), k, 1.5), (back, k.saturating_sub(1), -0.5)])
-                }
-                Sampling::Instants => {
-                    let rate = (now + after) * 0.5;
-                    let on = exp(&(rate * step));
-                    (rate, [(Matrix3::identity(), k, 0.5), (on, k + 1, 0.5)])
-                }
-            };
-            let (mut force, mut slope) = (Vector3::<f64>::zeros(), Vector3::<f64>::zeros());
-            for (r, i, share) in mean.iter().filter(|_| has_force) {
-                let (own, by_late) = without_delay(&scaled, late, *i);
-                force += r * own * *share;
-                slope += r * by_late * *share;
-            }
-            drive.rate.push(rate);
-            drive.force.push(if has_force { force } else { weight(track, k, gravity) });
-            drive.force_by_skew.push(slope / step);
-            (before, now) = (now, after);
-        }
-        drive
+        Drive { track, values, step, sampling, gravity, has_force, gust_time: GUST_TIME }
     }
 
     /// The same with gusts of the correlation time `gust_time` (s).
-    pub fn in_gusts(self, gust_time: f64) -> Drive {
+    pub fn in_gusts(self, gust_time: f64) -> Drive<'a> {
         Drive { gust_time, ..self }
+    }
+
+    /// Body rates at sample `k` without the errors of the gyros, rad/s.
+    fn gyro(&self, k: usize) -> Vector3<f64> {
+        let Drive { track, values, .. } = *self;
+        let rates = nuisance::without_gain(values, GYRO_GAIN, track.rates[k]);
+        let time = track.time(k, self.step);
+        Vector3::from(rates) - Vector3::from(nuisance::gyro_bias(values, time, &track.span))
+    }
+
+    /// Specific force at sample `k` without the gains and the delay of the accelerometers, body axes, m/s², and its derivative with
+    /// respect to the delay, per sampling interval.
+    fn own_force(&self, k: usize) -> (Vector3<f64>, Vector3<f64>) {
+        let Drive { track, values, .. } = *self;
+        let late = values[SKEW_FORCE] / self.step;
+        let scaled = |i: usize| nuisance::without_gain(values, FORCE_GAIN, track.force[i]);
+        interpolated(track.force.len(), scaled, late, k)
+    }
+
+    /// Mean rate and specific force from sample `k` to the next one.
+    fn mean(&self, k: usize) -> Mean {
+        let (now, step) = (self.gyro(k), self.step);
+        let (rate, shares): (_, [(Matrix3<f64>, usize, f64); 2]) = match self.sampling {
+            Sampling::Held => {
+                let before = k.saturating_sub(1);
+                let back = exp(&(self.gyro(before) * -step));
+                (now, [(Matrix3::identity(), k, 1.5), (back, before, -0.5)])
+            }
+            Sampling::Instants => {
+                let rate = (now + self.gyro(k + 1)) * 0.5;
+                let on = exp(&(rate * step));
+                (rate, [(Matrix3::identity(), k, 0.5), (on, k + 1, 0.5)])
+            }
+        };
+        let (mut force, mut slope) = (Vector3::<f64>::zeros(), Vector3::<f64>::zeros());
+        for (r, i, share) in shares.iter().filter(|_| self.has_force) {
+            let (own, by_late) = self.own_force(*i);
+            force += r * own * *share;
+            slope += r * by_late * *share;
+        }
+        let force = if self.has_force { force } else { weight(self.track, k, self.gravity) };
+        Mean { rate, force, force_by_skew: slope / step }
     }
 
     /// The step from sample `k` to the next sample, linearised at `path`.
     ///
     /// The gust decays with its correlation time.
-    pub fn step<const N: usize, const D: usize>(
-        &self,
-        path: &Path,
-        values: &Values,
-        k: usize,
-        step: f64,
-        gravity: f64,
-    ) -> Step<N, D> {
+    pub fn step<const N: usize, const D: usize>(&self, path: &Path, k: usize) -> Step<N, D> {
+        let Drive { values, step, .. } = *self;
+        let mean = self.mean(k);
         let body = path.attitude[k].transpose();
         let turned = body * path.attitude[k + 1];
-        let attitude = log(&(exp(&(self.rate[k] * step)).transpose() * turned));
-        let down = Vector3::new(0.0, 0.0, gravity);
+        let attitude = log(&(exp(&(mean.rate * step)).transpose() * turned));
+        let down = Vector3::new(0.0, 0.0, self.gravity);
         let earth = Vector3::new(values[EARTH], 0.0, values[EARTH + 1]);
         let v = path.velocity[k];
         let coriolis = earth.cross(&v) * -2.0;
         let gained = body * (path.velocity[k + 1] - v - (down + coriolis) * step);
         let bias = Vector3::from_column_slice(&values[FORCE..FORCE + 3]);
-        let velocity = gained - (self.force[k] - bias) * step;
+        let velocity = gained - (mean.force - bias) * step;
         let one = Matrix3::identity();
         let mut link = Step { first: [[0.0; N]; N], second: [[0.0; N]; N], rest: [[0.0; D]; N] };
         put(&mut link.first, (0, 0), &-turned.transpose());
@@ -159,24 +168,37 @@ impl Drive {
             (0..3).for_each(|i| link.rest[6 + i][D - 1] = -gust[i]);
         }
         if D > 1 {
-            let time = self.start + (k as f64 + 0.5) * step;
-            for axis in 0..3 {
-                for (place, by) in nuisance::gyro_bias_of(axis, time, &self.span) {
-                    link.rest[axis][place - INERTIAL] = step * by;
-                }
-            }
-            put(&mut link.rest, (3, FORCE - INERTIAL), &(one * step));
-            for i in 0..3 {
-                link.rest[i][GYRO_GAIN + i - INERTIAL] = self.rate[k][i] * step;
-                link.rest[3 + i][FORCE_GAIN + i - INERTIAL] = self.force[k][i] * step;
-                link.rest[3 + i][SKEW_FORCE - INERTIAL] = self.force_by_skew[k][i] * -step;
-            }
-            for (place, axis) in [(EARTH, Vector3::x()), (EARTH + 1, Vector3::z())] {
-                let slope = body * axis.cross(&v) * (2.0 * step);
-                (0..3).for_each(|i| link.rest[3 + i][place - INERTIAL] = slope[i]);
-            }
+            self.by_constants(&mean, &(body, v), k, &mut link.rest);
         }
         link
+    }
+
+    /// Sets the derivatives of the step from sample `k` with respect to the constants that act between samples. `mean` are the means
+    /// over the step, `body` is the rotation to body axes and `v` the velocity (m/s) at sample `k`.
+    fn by_constants<const N: usize, const D: usize>(
+        &self,
+        mean: &Mean,
+        (body, v): &(Matrix3<f64>, Vector3<f64>),
+        k: usize,
+        rest: &mut Wide<N, D>,
+    ) {
+        let step = self.step;
+        let time = self.track.start + (k as f64 + 0.5) * step;
+        for (axis, row) in rest.iter_mut().take(3).enumerate() {
+            for (place, by) in nuisance::gyro_bias_of(axis, time, &self.track.span) {
+                row[place - INERTIAL] = step * by;
+            }
+        }
+        put(rest, (3, FORCE - INERTIAL), &(Matrix3::<f64>::identity() * step));
+        for i in 0..3 {
+            rest[i][GYRO_GAIN + i - INERTIAL] = mean.rate[i] * step;
+            rest[3 + i][FORCE_GAIN + i - INERTIAL] = mean.force[i] * step;
+            rest[3 + i][SKEW_FORCE - INERTIAL] = mean.force_by_skew[i] * -step;
+        }
+        for (place, axis) in [(EARTH, Vector3::x()), (EARTH + 1, Vector3::z())] {
+            let slope = body * axis.cross(v) * (2.0 * step);
+            (0..3).for_each(|i| rest[3 + i][place - INERTIAL] = slope[i]);
+        }
     }
 }
 
@@ -195,8 +217,18 @@ pub fn shifted(samples: &[[f64; 3]], late: f64) -> Vec<Vector3<f64>> {
 /// Sample `k` of `samples` without a delay of `late` sampling intervals, and its derivative with respect to the delay, per
 /// sampling interval. The interpolation is cubic, from four samples.
 fn without_delay(samples: &[[f64; 3]], late: f64, k: usize) -> (Vector3<f64>, Vector3<f64>) {
-    let last = samples.len() as isize - 1;
-    let at = |i: isize| Vector3::from(samples[i.clamp(0, last) as usize]);
+    interpolated(samples.len(), |i| samples[i], late, k)
+}
+
+/// The same with `count` samples that the function `sample` returns.
+fn interpolated(
+    count: usize,
+    sample: impl Fn(usize) -> [f64; 3],
+    late: f64,
+    k: usize,
+) -> (Vector3<f64>, Vector3<f64>) {
+    let last = count as isize - 1;
+    let at = |i: isize| Vector3::from(sample(i.clamp(0, last) as usize));
     let whole = late.floor();
     let i = k as isize + whole as isize;
     cubic([i - 1, i, i + 1, i + 2].map(at), late - whole)

@@ -5,7 +5,7 @@
 //! sample to the next with gyros and accelerometers. The colour of a channel is the ratio of its slow noise to white noise.
 
 use crate::flight_path::intake::{Log, Track};
-use crate::flight_path::measurement::{self, Reading};
+use crate::flight_path::measurement::{self, Residuals};
 use crate::flight_path::noise;
 use crate::flight_path::path::CHANNELS;
 use greylag_physics::sensors::Noisy;
@@ -196,12 +196,12 @@ impl Levels {
         1.0_f64.hypot(least / level)
     }
 
-    /// Estimates the levels again from the residuals in `readings`. `step` is the sampling interval, s. Returns the largest
+    /// Estimates the levels again from the `residuals` of every stretch. `step` is the sampling interval, s. Returns the largest
     /// |natural logarithm| of the ratio of a new to an old level.
-    pub fn renew(&mut self, readings: &[Vec<Reading>], step: f64) -> f64 {
+    pub fn renew(&mut self, residuals: &[Vec<Residuals>], step: f64) -> f64 {
         let mut change = 0.0_f64;
         for (channel, widest) in WIDEST.into_iter().enumerate() {
-            let all = readings.iter().flatten().map(|r| r.residual[channel]);
+            let all = residuals.iter().flatten().map(|r| r[channel]);
             let mut residuals: Vec<f64> = all.filter(|x| !x.is_nan()).collect();
             let over = |block: f64| noise::colour(&residuals, (block / step).round() as usize);
             let colour = COLOUR_BLOCKS.map(over).into_iter().fold(1.0, f64::max);

@@ -26,18 +26,27 @@ pub const OTHERS: usize = 16;
 /// long flight would be the largest list in memory.
 pub type Others = [f32; OTHERS];
 
+/// Measured less predicted values of an instant, by channel, rad or m/s; NaN without a measurement.
+pub type Residuals = [f64; CHANNELS];
+
+/// Number of instants whose predictions are in memory at a time: those of all instants of a long flight would take much memory.
+pub const PIECE: usize = 16_384;
+
+/// Number of instants on either side of an instant whose predictions its reading needs.
+const BESIDE: usize = 2;
+
 /// Measurements of an instant less their predictions.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading {
-    /// Measured less predicted, by channel, rad or m/s; NaN without a measurement.
-    pub residual: [f64; CHANNELS],
+    /// Measured less predicted values.
+    pub residual: Residuals,
     /// Derivatives of the predictions with respect to the delay of each channel, rad/s or m/s².
     by_late: [f64; CHANNELS],
 }
 
 impl Reading {
     /// This reading with `residuals` in the channels that have measurements.
-    pub fn with(mut self, residuals: [f64; CHANNELS]) -> Reading {
+    pub fn with(mut self, residuals: Residuals) -> Reading {
         for (residual, other) in self.residual.iter_mut().zip(residuals) {
             *residual = if residual.is_nan() { f64::NAN } else { other };
         }
@@ -132,79 +141,100 @@ pub fn by_gust(path: &Path, k: usize, values: &Values) -> Option<Matrix3<f64>> {
     Some(slopes * -path.attitude[k].transpose())
 }
 
-/// Readings at every sample of `track`, for a sampling interval of `step` (s).
-pub fn readings(
-    track: &Track,
-    path: &Path,
-    values: &Values,
-    step: f64,
-    vanes_at: Option<[f64; 3]>,
-) -> Vec<Reading> {
-    let predicted = Predicted::new(track, path, values, step, vanes_at);
-    let samples = (0..path.len()).into_par_iter().with_min_len(1000);
-    samples.map(|k| predicted.reading(k)).collect()
+/// The sensors of a track, with their errors.
+#[derive(Clone, Copy)]
+pub struct Instruments<'a> {
+    /// The measurements.
+    pub track: &'a Track,
+    /// The constants of the flight, each in its unit.
+    pub values: &'a Values,
+    /// Sampling interval, s.
+    pub step: f64,
+    /// Position of the vanes, m from the centre of gravity, body axes, if it is known.
+    pub vanes_at: Option<[f64; 3]>,
 }
 
-/// Predictions for the sensors along a path, from which the readings follow.
-pub struct Predicted<'a> {
-    track: &'a Track,
-    values: &'a Values,
-    /// Sampling interval, s.
-    step: f64,
-    /// Values of error-free sensors at every sample.
+impl<'a> Instruments<'a> {
+    /// Readings at every sample along `path`.
+    pub fn readings(&self, path: &Path) -> Vec<Reading> {
+        let mut all: Vec<Reading> = Vec::with_capacity(path.len());
+        for from in (0..path.len()).step_by(PIECE) {
+            let to = (from + PIECE).min(path.len());
+            let predicted = self.predicted(path, from, to);
+            let samples = (from..to).into_par_iter().with_min_len(1000);
+            all.par_extend(samples.map(|k| predicted.reading(k)));
+        }
+        all
+    }
+
+    /// Residuals along `path` at `count` samples from the sample `from` on, or at fewer where the path ends.
+    pub fn residuals(&self, path: &Path, from: usize, count: usize) -> Vec<Residuals> {
+        let to = (from + count).min(path.len());
+        let predicted = self.predicted(path, from, to);
+        let samples = (from..to).into_par_iter().with_min_len(1000);
+        samples.map(|k| predicted.reading(k).residual).collect()
+    }
+
+    /// Predictions for the readings at the samples from `from` to `to`, the last one excluded.
+    fn predicted(&self, path: &Path, from: usize, to: usize) -> Predicted<'a> {
+        let (first, end) = (from.saturating_sub(BESIDE), (to + BESIDE).min(path.len()));
+        let roll = self.values[BOARD_ROLL];
+        let of = |k: usize| shown(path, k, &self.track.rates[k], self.vanes_at, roll);
+        let samples = (first..end).into_par_iter().with_min_len(1000);
+        Predicted { sensors: *self, count: path.len(), first, shown: samples.map(of).collect() }
+    }
+}
+
+/// Predictions for the sensors along a part of a path, from which the readings follow.
+struct Predicted<'a> {
+    sensors: Instruments<'a>,
+    /// Number of samples of the whole path.
+    count: usize,
+    /// Index of the first sample in `shown`.
+    first: usize,
+    /// Values of error-free sensors.
     shown: Vec<[f64; CHANNELS]>,
 }
 
-impl<'a> Predicted<'a> {
-    /// Predictions with the sensor errors `values`. The other arguments are those of [`readings`].
-    pub fn new(
-        track: &'a Track,
-        path: &Path,
-        values: &'a Values,
-        step: f64,
-        vanes_at: Option<[f64; 3]>,
-    ) -> Predicted<'a> {
-        let samples = (0..path.len()).into_par_iter().with_min_len(1000);
-        let of = |k: usize| shown(path, k, &track.rates[k], vanes_at, values[BOARD_ROLL]);
-        let shown = samples.map(of).collect();
-        Predicted { track, values, step, shown }
-    }
-
+impl Predicted<'_> {
     /// The reading at sample `j`.
-    pub fn reading(&self, j: usize) -> Reading {
+    fn reading(&self, j: usize) -> Reading {
+        let Instruments { track, values, step, .. } = self.sensors;
         let mut reading = Reading { residual: [f64::NAN; CHANNELS], by_late: [0.0; CHANNELS] };
-        let n = self.shown.len();
+        let n = self.count;
         if j == 0 || j + 1 >= n {
             return reading;
         }
         for channel in 0..CHANNELS {
-            let late = self.values[skew_of(channel)] / self.step;
+            let late = values[skew_of(channel)] / step;
             let whole = late.round();
             let data = j as isize + whole as isize;
             if data < 0 || data as usize >= n {
                 continue;
             }
-            let y = measured(self.track, channel, data as usize);
+            let y = measured(track, channel, data as usize);
             if y.is_nan() {
                 continue;
             }
-            let (h, slope) = seen_at(&self.shown, channel, j, whole - late);
-            let (h, gain) = with_errors(channel, h, self.values);
+            let (h, slope) = self.seen_at(channel, j, whole - late);
+            let (h, gain) = with_errors(channel, h, values);
             reading.residual[channel] = turn(channel, y - h);
-            reading.by_late[channel] = -gain * slope / self.step;
+            reading.by_late[channel] = -gain * slope / step;
         }
         reading
     }
-}
 
-/// Value of an error-free sensor at the time `part` sampling intervals after sample `j`, and its slope per sampling interval.
-fn seen_at(shown: &[[f64; CHANNELS]], channel: usize, j: usize, part: f64) -> (f64, f64) {
-    let (here, last) = (shown[j][channel], shown.len() as isize - 1);
-    let beside = |i: isize| turn(channel, shown[i.clamp(0, last) as usize][channel] - here);
-    let whole = part.floor();
-    let i = j as isize + whole as isize;
-    let (beside, slope) = cubic([i - 1, i, i + 1, i + 2].map(beside), part - whole);
-    (here + beside, slope)
+    /// Value of an error-free sensor at the time `part` (−0.5 to 0.5) sampling intervals after sample `j`, and its slope per sampling
+    /// interval.
+    fn seen_at(&self, channel: usize, j: usize, part: f64) -> (f64, f64) {
+        let shown = |k: usize| self.shown[k - self.first][channel];
+        let (here, last) = (shown(j), self.count as isize - 1);
+        let beside = |i: isize| turn(channel, shown(i.clamp(0, last) as usize) - here);
+        let whole = part.floor();
+        let i = j as isize + whole as isize;
+        let (beside, slope) = cubic([i - 1, i, i + 1, i + 2].map(beside), part - whole);
+        (here + beside, slope)
+    }
 }
 
 /// A difference of a channel's values, wrapped to ±π for attitude angles.

@@ -187,7 +187,7 @@ pub enum ReconstructError {
 }
 
 /// Reconstructs `flight`: resamples each segment to uniform time steps, and estimates and removes sensor errors and wind. A
-/// flight that is passed by value is dropped after the resampling, to free its memory.
+/// flight that is passed by value is dropped before the resampling, to free its memory.
 ///
 /// # Errors
 /// If a required channel is missing, the log contains no flight, no stretch of it is long enough, or no path fits the
@@ -196,9 +196,8 @@ pub fn reconstruct(
     flight: impl Borrow<Flight>,
     options: &Options,
 ) -> Result<Reconstruction, ReconstructError> {
-    let log = intake::take_in(flight.borrow(), options)?;
     let declared = options.sampling.or_else(|| flight.borrow().declared_sampling());
-    drop(flight);
+    let log = intake::take_in(flight, options)?;
     let (means, widths) = (nuisance::prior_means(&log), nuisance::prior_widths(&log));
     let problem = Problem { log: &log, options, sampling: Sampling::Instants, means, widths };
     let Chosen { sampling, found, note } = sampling::choose(&problem, declared)?;

@@ -1,11 +1,12 @@
 //! Conversion of the smoother's result to the reconstruction of a flight: states, sensor errors, remaining errors of the states,
 //! delay of the recorded actuators, and notes.
 
+mod copies;
+
 use nalgebra::Vector3;
 
-use crate::flight_path::actuator_skew::{self, ByAxis, Skew};
-use crate::flight_path::channel::wrap;
-use crate::flight_path::equations::{Found, Problem, no_path};
+use crate::flight_path::actuator_skew::{self, Skew};
+use crate::flight_path::equations::{Found, Problem};
 use crate::flight_path::intake::{Log, Track};
 use crate::flight_path::kinematics::shifted;
 use crate::flight_path::levels::CALM;
@@ -17,9 +18,8 @@ use crate::flight_path::reconstruction::{Instant, Nuisance, Reconstruction, Segm
 use crate::flight_path::rotation::to_euler;
 use crate::flight_path::{ActuatorClock, ReconstructError};
 use greylag_num::statistics::mean;
-use greylag_num::stream::stream;
 use greylag_physics::sensors::Known;
-use greylag_physics::{Controls, State};
+use greylag_physics::{Command, Controls, State};
 
 /// A constant (sensor error or wind) counts as unobservable if its posterior standard deviation exceeds this fraction of its
 /// prior standard deviation.
@@ -47,10 +47,6 @@ const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// Name of the delay of the recorded deflections among the nuisance parameters.
 const LATE: &str = "skew_actuators";
 
-/// Number of random draws of the error of the path. With three draws, the RMS errors over a flight are accurate to a few
-/// percent.
-const DRAWS: usize = 3;
-
 /// Assembles the reconstruction from the result `found` of the smoother.
 ///
 /// # Errors
@@ -60,9 +56,9 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     let mut nuisances = nuisances(problem, found);
     let mut notes = log.notes.clone();
     declare(problem, found, &nuisances, &mut notes);
-    // before the flight itself, because the copies take as much memory
-    let (left, erring) = draws(problem, found)?;
-    let segments = path_as_segments(problem, found, &found.paths, None);
+    // before the flight itself, because the copies take much memory, too
+    let (left, erring) = copies::draws(problem, found)?;
+    let segments = path_as_segments(problem, found);
     let finite = |i: &Instant| i.specific_force.iter().all(|f| f.is_finite());
     if !log.has.force {
         notes.push(match segments.iter().flat_map(|s| &s.instants).any(finite) {
@@ -75,7 +71,8 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
         });
     }
     nuisances.extend(unmeasured_angles(problem, found, &segments, &left));
-    let own = actuator_skew::by_axis(&segments, log.step, problem.sampling);
+    let instants: Vec<&[Instant]> = segments.iter().map(|s| s.instants.as_slice()).collect();
+    let own = actuator_skew::by_axis(&instants, log.step, problem.sampling);
     let skew = actuator_skew::estimate(own, &erring, log.step, found.levels.gusts);
     nuisances.push(Nuisance {
         name: LATE.into(),
@@ -146,91 +143,31 @@ fn left_as_recorded(skew: &Skew) -> String {
     )
 }
 
-/// Simulates the error of the path in random copies of the flight. Returns the root mean square error of each state, and the
-/// actuator delays that are estimated from each copy. The returned errors of the body rates are the noise levels of the gyros.
-fn draws(problem: &Problem, found: &Found) -> Result<([f64; 8], Vec<ByAxis>), ReconstructError> {
-    let singular = || no_path(&problem.options.name, "the equations became singular");
-    let mut random = stream(0, &[]);
-    let (mut squares, mut count, mut delays) = ([0.0; 8], 0.0_f64, Vec::new());
-    for _ in 0..DRAWS {
-        // a copy is as large as the flight, so only one is in memory at a time
-        let erring = problem.erring(found, &mut random).ok_or_else(singular)?;
-        let copy = path_as_segments(problem, found, &erring.paths, Some(&erring.gyro));
-        drop(erring);
-        let pairs = found.paths.iter().zip(&copy);
-        let samples = pairs.flat_map(|(own, copy)| {
-            copy.instants
-                .iter()
-                .enumerate()
-                .map(move |(k, at)| (drawn(own, k), at.state.to_array()))
-        });
-        for (a, b) in samples {
-            for (a, i) in a.iter().zip(DRAWN) {
-                let error = if i == 0 { wrap(b[i] - a) } else { b[i] - a };
-                squares[i] += error * error;
-            }
-            count += 1.0;
-        }
-        delays.push(actuator_skew::by_axis(&copy, problem.log.step, problem.sampling));
-    }
-    let mut left = squares.map(|sum| (sum / count).sqrt());
-    left[3..6].copy_from_slice(&found.levels.gyro);
-    Ok((left, delays))
-}
-
-/// Indices of the states that have a drawn error: roll, pitch, airspeed, α, β.
-const DRAWN: [usize; 5] = [0, 1, 2, 6, 7];
-
-/// These states of `path` at sample `k`.
-fn drawn(path: &Path, k: usize) -> [f64; DRAWN.len()] {
-    let [roll, pitch, _] = to_euler(&path.attitude[k]);
-    let air = path.air_velocity(k);
-    let [alpha, beta] = flow_angles(&air);
-    [roll, pitch, air.norm(), alpha, beta]
-}
-
-/// Makes segments with the states of `paths`. If the noise `gyro` (rad/s) is given, it is added to the body rates.
-fn path_as_segments(
-    problem: &Problem,
-    found: &Found,
-    paths: &[Path],
-    gyro: Option<&[Vec<[f64; 3]>]>,
-) -> Vec<Segment> {
+/// Makes segments with the states of the paths in `found`.
+fn path_as_segments(problem: &Problem, found: &Found) -> Vec<Segment> {
     let Problem { log, options, .. } = *problem;
-    let pairs = log.tracks.iter().zip(paths).enumerate();
-    let one = |(i, (track, path)): (usize, (&Track, &Path))| {
-        let gyro = gyro.map(|g| &g[i][..]);
-        segment(track, path, &found.values, log, options.gravity, gyro)
-    };
+    let pairs = log.tracks.iter().zip(&found.paths);
+    let one =
+        |(track, path): (&Track, &Path)| segment(track, path, &found.values, log, options.gravity);
     pairs.map(one).collect()
 }
 
-fn segment(
-    track: &Track,
-    path: &Path,
-    values: &Values,
-    log: &Log,
-    gravity: f64,
-    gyro: Option<&[[f64; 3]]>,
-) -> Segment {
+fn segment(track: &Track, path: &Path, values: &Values, log: &Log, gravity: f64) -> Segment {
     let force = match log.has.force {
         true => shifted(&track.force, values[SKEW_FORCE] / log.step),
         false => path_force(track, path, log, gravity),
     };
     let instant = |k: usize| {
-        let [roll, pitch, yaw] = to_euler(&path.attitude[k]);
-        let air = path.air_velocity(k);
-        let [alpha, beta] = flow_angles(&air);
-        let noise = gyro.map_or([0.0; 3], |g| g[k]);
-        let bias = nuisance::gyro_bias(values, track.time(k, log.step), &track.span);
-        let rates = nuisance::without_gain(values, GYRO_GAIN, track.rates[k]);
-        let [p, q, r] = std::array::from_fn(|i| rates[i] - bias[i] + noise[i]);
+        let (state, yaw) = state(track, path, values, log.step, (k, [0.0; 3]));
+        let [aileron, elevator, throttle, rudder] = track.commands[k];
+        let command = Command { aileron, elevator, throttle, rudder };
+        let [aileron, elevator, throttle, rudder] = track.controls[k];
         Instant {
             time_s: track.start + k as f64 * log.step,
-            state: State { roll, pitch, airspeed: air.norm(), p, q, r, alpha, beta },
+            state,
             yaw: if log.has.yaw { yaw } else { f64::NAN },
-            controls: track.controls[k],
-            command: track.commands[k],
+            controls: Controls { aileron, elevator, throttle, rudder, lagged: None },
+            command: command.is_finite().then_some(command),
             specific_force: std::array::from_fn(|i| {
                 let gain = if log.has.force { 1.0 + values[FORCE_GAIN + i] } else { 1.0 };
                 force[k][i] / gain - values[FORCE + i]
@@ -241,6 +178,24 @@ fn segment(
         }
     };
     Segment { instants: (0..track.len()).map(instant).collect() }
+}
+
+/// State at sample `k` of a path, with the body rates of `track` less the errors of the gyros plus `noise` (rad/s), and the heading,
+/// rad.
+fn state(
+    track: &Track,
+    path: &Path,
+    values: &Values,
+    step: f64,
+    (k, noise): (usize, [f64; 3]),
+) -> (State, f64) {
+    let [roll, pitch, yaw] = to_euler(&path.attitude[k]);
+    let air = path.air_velocity(k);
+    let [alpha, beta] = flow_angles(&air);
+    let bias = nuisance::gyro_bias(values, track.time(k, step), &track.span);
+    let rates = nuisance::without_gain(values, GYRO_GAIN, track.rates[k]);
+    let [p, q, r] = std::array::from_fn(|i| rates[i] - bias[i] + noise[i]);
+    (State { roll, pitch, airspeed: air.norm(), p, q, r, alpha, beta }, yaw)
 }
 
 /// Specific force along a path, for a log without accelerometers: acceleration minus gravity, body axes, m/s². NaN at samples

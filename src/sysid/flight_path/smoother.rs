@@ -10,8 +10,9 @@ use nalgebra::Vector3;
 
 use crate::flight_path::ReconstructError;
 use crate::flight_path::calibration;
-use crate::flight_path::equations::{Found, Problem, Solved, no_path};
+use crate::flight_path::equations::{Found, HELD, Problem, Solved, no_path};
 use crate::flight_path::gusts;
+use crate::flight_path::intake::Track;
 use crate::flight_path::kinematics::MOTION;
 use crate::flight_path::levels::{CALM, GUST_TIME, Levels};
 use crate::flight_path::nuisance::{self, WIND};
@@ -53,7 +54,7 @@ pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
         Some(levels) if levels.gusts > STRONG => {
             // the first fit is made again: a copy of it would take memory in all flights, also in those without strong gusts
             drop(found);
-            in_gusts(problem, &first(problem)?)
+            in_gusts(problem)
         }
         Some(levels) => {
             gusty(&freed, &mut found, levels, &singular)?;
@@ -79,14 +80,18 @@ fn first(problem: &Problem) -> Result<Found, ReconstructError> {
     Ok(found)
 }
 
-/// Fits again from `before`, a fit without rare errors of the sensors, if gusts are strong. Errors of the air-data sensors keep
-/// their prior means and standard deviations, because gusts bias their estimates. Any other error must be beyond doubt with the
-/// standard deviation that gusts give it, too.
-fn in_gusts(problem: &Problem, before: &Found) -> Result<Found, ReconstructError> {
+/// Fits again from the first fit, which is without rare errors of the sensors, if gusts are strong. Errors of the air-data sensors
+/// keep their prior means and standard deviations, because gusts bias their estimates. Any other error must be beyond doubt with
+/// the standard deviation that gusts give it, too.
+fn in_gusts(problem: &Problem) -> Result<Found, ReconstructError> {
     let singular = || no_path(&problem.options.name, "the equations became singular");
     let mut held = calibration::OF_AIR.to_vec();
+    let long = problem.log.tracks.iter().map(Track::len).sum::<usize>() > HELD;
+    let mut before: Option<Found> = None;
     loop {
-        let (mut freed, mut found) = (*problem, before.clone());
+        let (mut freed, mut found) = (*problem, before.take().map_or_else(|| first(problem), Ok)?);
+        // the first fit of a long flight is made again where a second round needs it: a copy would take much memory
+        before = (!long).then(|| found.clone());
         for place in calibration::OF_AIR {
             freed.widths[place] = nuisance::exact(place, freed.widths[place]);
         }
@@ -168,7 +173,7 @@ fn calm(problem: &Problem, found: &mut Found, from: usize) -> Result<(), Reconst
         if iteration < FIRST {
             continue;
         }
-        let change = found.levels.renew(&solved.readings, log.step);
+        let change = found.levels.renew(&solved.residuals, log.step);
         let change = change.max(found.levels.loosen(&problem.step_residuals(found)));
         if iteration > from.max(FIRST) && moved < STEP_TOLERANCE && change < LEVEL_TOLERANCE {
             break;
@@ -189,7 +194,7 @@ fn search(
     solved: &Solved<MOTION>,
     bound: f64,
 ) -> Result<f64, ReconstructError> {
-    let before = problem.merit(found, bound, Some(solved.readings.as_slice()));
+    let before = problem.merit(found, bound, Some(solved.residuals.as_slice()));
     let mut part = 1.0;
     while part >= LEAST_PART {
         let mut trial = found.clone();

@@ -10,7 +10,7 @@ use crate::flight_path::band::{self, Link, Node, add_gram, add_upper_gram};
 use crate::flight_path::intake::Track;
 use crate::flight_path::kinematics::{Drive, MOTION, Step};
 use crate::flight_path::levels::Levels;
-use crate::flight_path::measurement::{self, Others, Reading};
+use crate::flight_path::measurement::{self, Instruments, Others, Reading, Residuals};
 use crate::flight_path::nuisance::Values;
 use crate::flight_path::path::{CHANNELS, Path};
 
@@ -21,12 +21,11 @@ pub const PROCESS: f64 = 1.5;
 /// Equations of a stretch along the present path, with `N` unknowns for each instant. `M` is the number of columns for
 /// constants that act at instants, `D` for constants that act between instants. Both numbers include the right-hand side.
 pub struct Along<'a, const N: usize, const M: usize, const D: usize> {
-    problem: &'a Problem<'a>,
     path: &'a Path,
     values: &'a Values,
     /// Measurements less their predictions.
     pub readings: Vec<Reading>,
-    drive: Drive,
+    drive: Drive<'a>,
     /// Gust at the first instant of the path; `gusts` is the standard deviation of gusts. Both in m/s.
     pub first: Vector3<f64>,
     gusts: f64,
@@ -40,8 +39,8 @@ pub struct Along<'a, const N: usize, const M: usize, const D: usize> {
 impl<'a, const N: usize, const M: usize, const D: usize> Along<'a, N, M, D> {
     /// Equations of `track` along `path`, with the constants and levels of `found`.
     pub fn new(
-        problem: &'a Problem<'a>,
-        track: &Track,
+        problem: &Problem,
+        track: &'a Track,
         path: &'a Path,
         found: &'a Found,
         bound: f64,
@@ -49,15 +48,14 @@ impl<'a, const N: usize, const M: usize, const D: usize> Along<'a, N, M, D> {
     ) -> Self {
         let (step, gravity) = (problem.log.step, problem.options.gravity);
         let (values, l) = (&found.values, &found.levels);
-        let vanes_at = problem.log.sensors.vanes_at();
+        let sensors = Instruments { track, values, step, vanes_at: problem.log.sensors.vanes_at() };
         Along {
-            readings: measurement::readings(track, path, values, step, vanes_at),
+            readings: sensors.readings(path),
             drive: Drive::new(track, values, step, problem.sampling, gravity).in_gusts(l.gust_time),
             first: path.gust[0],
             gusts: l.gusts,
             spread: std::array::from_fn(|i| l.measured[i] * l.colour[i]),
             sd: step_deviations::<N>(l, step),
-            problem,
             path,
             values,
             bound,
@@ -65,10 +63,16 @@ impl<'a, const N: usize, const M: usize, const D: usize> Along<'a, N, M, D> {
         }
     }
 
+    /// The residuals of the readings. They use the memory of the readings, because both would be large in a long flight.
+    pub fn residuals(self) -> Vec<Residuals> {
+        let mut all: Vec<Residuals> = self.readings.into_iter().map(|r| r.residual).collect();
+        all.shrink_to_fit();
+        all
+    }
+
     /// The kinematic step from sample `k` to the next one.
     pub fn step(&self, k: usize) -> Step<N, D> {
-        let (step, gravity) = (self.problem.log.step, self.problem.options.gravity);
-        self.drive.step::<N, D>(self.path, self.values, k, step, gravity)
+        self.drive.step::<N, D>(self.path, k)
     }
 }
 

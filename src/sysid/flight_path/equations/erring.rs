@@ -28,6 +28,9 @@ pub struct Erring {
     pub gyro: Vec<Vec<[f64; 3]>>,
 }
 
+/// The unknowns of a path, for every instant.
+type Unknowns<const N: usize> = Vec<[f64; N]>;
+
 impl Problem<'_> {
     /// Changes of the constants that [`calm`](Self::calm) would estimate if the air-data sensors had the residuals `others`,
     /// given for each track and instant. `None` if the equations are singular.
@@ -53,30 +56,49 @@ impl Problem<'_> {
     /// The reconstructed paths plus the error that one random draw of the noise of every sensor causes. The constants are held.
     /// `None` if the equations are singular.
     pub fn erring(&self, found: &Found, random: &mut Stream) -> Option<Erring> {
-        let mut erring = Erring { paths: found.paths.clone(), gyro: Vec::new() };
-        for (track, path) in self.log.tracks.iter().zip(&mut erring.paths) {
-            let gyro = if found.levels.gusts > CALM {
+        let mut erring = Erring { paths: Vec::new(), gyro: Vec::new() };
+        for (track, path) in self.log.tracks.iter().zip(&found.paths) {
+            let (path, gyro) = if found.levels.gusts > CALM {
                 self.err::<MOTION_AND_GUST>(track, path, found, random)?
             } else {
                 self.err::<MOTION>(track, path, found, random)?
             };
+            erring.paths.push(path);
             erring.gyro.push(gyro);
         }
         Some(erring)
     }
 
-    /// Adds one random draw of the estimation error to `path`. Returns the drawn noise of the gyros, rad/s.
+    /// `path` plus one random draw of the estimation error, and the drawn noise of the gyros, rad/s.
     fn err<const N: usize>(
         &self,
         track: &Track,
-        path: &mut Path,
+        path: &Path,
         found: &Found,
         random: &mut Stream,
-    ) -> Option<Vec<[f64; 3]>> {
-        let l = &found.levels;
+    ) -> Option<(Path, Vec<[f64; 3]>)> {
+        let (moves, noise) = self.moves::<N>(track, path, found, random)?;
+        let level = found.levels.gyro;
+        let of = |unit: &[f64; N]| -> [f64; 3] { std::array::from_fn(|i| level[i] * unit[i]) };
+        let gyro = noise.iter().map(of).collect();
+        drop(noise);
+        // the path is copied last: the equations of a long flight are large, too
+        let mut erring = path.clone();
+        moves.iter().enumerate().for_each(|(k, x)| erring.shift(k, x));
+        Some((erring, gyro))
+    }
+
+    /// Changes of the unknowns of `path` by one random draw of the noise of every sensor, and the standard normal random numbers for
+    /// the kinematic steps.
+    fn moves<const N: usize>(
+        &self,
+        track: &Track,
+        path: &Path,
+        found: &Found,
+        random: &mut Stream,
+    ) -> Option<(Unknowns<N>, Unknowns<N>)> {
         let mut unit = || -> f64 { StandardNormal.sample(random) };
-        let noise: Vec<[f64; N]> =
-            (0..path.len()).map(|_| std::array::from_fn(|_| unit())).collect();
+        let noise: Unknowns<N> = (0..path.len()).map(|_| std::array::from_fn(|_| unit())).collect();
         let mut along = Along::<N, 1, 1>::new(self, track, path, found, f64::INFINITY, None);
         along.first = Vector3::zeros();
         // as in the fit, coloured noise is replaced by white noise with a larger standard deviation
@@ -87,9 +109,7 @@ impl Problem<'_> {
         let drawn = Drawn { along, noise, sampling: self.sampling };
         let keep = if path.len() > HELD { Keep::Parts } else { Keep::Instants };
         let moves = band::eliminate(&drawn, keep)?.0.substitute(&drawn, &[1.0])?;
-        let noise = drawn.noise;
-        moves.iter().enumerate().for_each(|(k, x)| path.shift(k, x));
-        Some(noise.iter().map(|unit| std::array::from_fn(|i| l.gyro[i] * unit[i])).collect())
+        Some((moves, drawn.noise))
     }
 }
 

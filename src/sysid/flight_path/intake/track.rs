@@ -5,9 +5,9 @@ use super::channels::Channels;
 use super::{Present, Track};
 use crate::flight_path::Options;
 use crate::flight_path::channel::{Channel, wrap};
+use greylag_physics::Command;
 use greylag_physics::actuators::Actuators;
 use greylag_physics::atmosphere::{Atmosphere, Density};
-use greylag_physics::{Command, Controls};
 
 /// Interval over which the altitude is differenced to obtain the climb rate, s. It is also the interval at which an
 /// integrated heading is stored.
@@ -111,18 +111,19 @@ fn heading(track: &mut Track, step: f64) {
     }
 }
 
-/// The last command at or before `t` (s); `None` if aileron, elevator or throttle is missing. A missing rudder is zero.
-fn command(channels: &Channels, t: f64) -> Option<Command> {
+/// The last command at or before `t` (s): aileron, elevator, throttle, rudder. NaN if one of the first three is missing. A missing
+/// rudder is zero.
+fn command(channels: &Channels, t: f64) -> [f64; 4] {
     let [aileron, elevator, throttle, rudder] =
         std::array::from_fn(|i| channels.commands[i].held(t));
     let rudder = if rudder.is_finite() { rudder } else { 0.0 };
-    let command = Command { aileron, elevator, throttle, rudder };
-    command.is_finite().then_some(command)
+    let command = [aileron, elevator, throttle, rudder];
+    if command.iter().all(|x| x.is_finite()) { command } else { [f64::NAN; 4] }
 }
 
-/// Deflections (rad) and throttle position (0..1) at `times` (s). They are the logged positions or, if there are none, the
-/// commands passed through the actuator model.
-pub(super) fn controls(channels: &Channels, times: &[f64], options: &Options) -> Vec<Controls> {
+/// Deflections of aileron and elevator (rad), throttle position (0..1) and deflection of the rudder (rad) at `times` (s). They are
+/// the logged positions or, if there are none, the commands passed through the actuator model.
+fn controls(channels: &Channels, times: &[f64], options: &Options) -> Vec<[f64; 4]> {
     let f = &options.actuators;
     let sent = |t: f64| {
         let [aileron, elevator, throttle, rudder] = std::array::from_fn(|i| {
@@ -145,13 +146,12 @@ pub(super) fn controls(channels: &Channels, times: &[f64], options: &Options) ->
             let x = if x.is_nan() { channels.positions[i].held(t) } else { x };
             if x.is_finite() { x } else { simulated }
         };
-        all.push(Controls {
-            aileron: logged(0, simulated.aileron),
-            elevator: logged(1, simulated.elevator),
-            throttle: logged(2, simulated.throttle),
-            rudder: logged(3, if f.rudder.is_some() { simulated.rudder } else { 0.0 }),
-            lagged: None,
-        });
+        all.push([
+            logged(0, simulated.aileron),
+            logged(1, simulated.elevator),
+            logged(2, simulated.throttle),
+            logged(3, if f.rudder.is_some() { simulated.rudder } else { 0.0 }),
+        ]);
     }
     all
 }
