@@ -9,6 +9,7 @@ as Rust; with --judge it prints the table of other records with them. The second
 
 import argparse
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -18,13 +19,17 @@ import scoring
 from hidden import PARAMETERS
 from score import wilson
 
+SOURCE = Path(__file__).resolve().parents[2] / "src/sysid/diagnose/answer/probability.rs"
 EVIDENCE = (-2.0, 6.0)
 LEARNABLE = (1e-3, 1.0)
 UNEXAMINED = 0.5
 HELD_OUT = 0.1
-SIZES = {"LEADING": 5, "ALIKE": 1, "OTHER": 5, "UNKNOWN": 5}
-RIDGE = 0.02
-"""Weight of the squares of the weights in the fit, a case: few cases have some of the features."""
+SIZES = {"LEADING": 5, "OTHER": 5, "UNKNOWN": 5}
+RIDGE = 5e-4
+"""Weight of the squares of the weights in the fit: few cases have some of the features."""
+
+PRIOR = {"nothing": 1 / 3, "unknown": 1 / 6}
+"""Prior probabilities, to which the cases are weighted; the rest is for the effects of the catalogue."""
 
 
 def reached(r):
@@ -46,7 +51,7 @@ def case_of(r):
     ratio = float(np.clip(math.log(max((evidence or 0.0) / threshold, 1e-9)), *EVIDENCE))
     unstable = 1.0 - (UNEXAMINED if judged["stable"] is None else judged["stable"])
     slight = judged["held_out"] is not None and judged["held_out"] < HELD_OUT
-    refused = judged["status"] == "refused" and not slight
+    asserted = judged["status"] in ("missing", "indistinguishable")
     small = judged["status"] == "small" or (judged["status"] == "refused" and slight)
     left = r["learnable"] if "learnable" in r else r["remainder"]
     left = math.log(float(np.clip(left or 0.0, *LEARNABLE)) / LEARNABLE[0])
@@ -61,14 +66,15 @@ def case_of(r):
         label = "nothing"
     else:
         label = "unknown" if lacks else "other"
-    return np.array([1.0, ratio, refused, small, unstable]), np.array([1.0, ratio, refused, r["verdict"] == "unexplained", left]), len(alike), label
+    checked = np.array([1.0, ratio, asserted, small, unstable])
+    return checked, np.array([1.0, ratio, asserted, r["verdict"] == "unexplained", left]), len(alike), label
 
 
 def logits(w, case):
-    """Log odds against `nothing`: the leading candidate, each one like it, all others, what the catalogue lacks."""
+    """Log odds against `nothing`: the leading candidate, each one that cannot be told from it, all others, what the catalogue lacks."""
     checked, of_unknown, _, _ = case
     leading = checked @ w[:5]
-    return {"leading": leading, "alike": leading + w[5], "other": checked @ w[6:11], "unknown": of_unknown @ w[11:16], "nothing": 0.0}
+    return {"leading": leading, "alike": leading, "other": checked @ w[5:10], "unknown": of_unknown @ w[10:15], "nothing": 0.0}
 
 
 def probabilities(w, case):
@@ -82,10 +88,14 @@ def probabilities(w, case):
 
 def fitted(cases):
     """Weights of the greatest likelihood."""
-    start = np.array([0.0, 1.0, -1.0, -1.0, -1.0, -1.0, -1.0, 0.5, 0.5, 0.0, 1.0, -1.0, 0.5, 1.0, 0.0, 0.5])
+    start = np.array([0.0, 1.0, 1.0, -1.0, -1.0, -1.0, 0.5, 0.0, 0.0, 1.0, -1.0, 0.5, 0.0, 1.0, 0.5])
+    group = [c[3] if c[3] in PRIOR else "effect" for c in cases]
+    prior = {**PRIOR, "effect": 1.0 - sum(PRIOR.values())}
+    weights = [prior[g] / group.count(g) for g in group]
 
     def loss(w):
-        return -sum(math.log(max(probabilities(w, c)[c[3]], 1e-12)) for c in cases) / len(cases) + RIDGE / 10 * float((w - start) @ (w - start))
+        likelihood = sum(of * math.log(max(probabilities(w, c)[c[3]], 1e-12)) for of, c in zip(weights, cases))
+        return RIDGE * float((w - start) @ (w - start)) - likelihood
 
     return minimize(loss, start, method="L-BFGS-B").x
 
@@ -95,7 +105,7 @@ def rust(w):
     at, lines = 0, []
     for name, size in SIZES.items():
         values = ", ".join(f"{x:.2f}" for x in w[at : at + size])
-        lines.append(f"const {name}: f64 = {values};" if size == 1 else f"const {name}: [f64; {size}] = [{values}];")
+        lines.append(f"const {name}: [f64; {size}] = [{values}];")
         at += size
     return "\n".join(lines)
 
@@ -143,6 +153,7 @@ def main():
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--fit", type=Path, nargs="+", help="records to which the weights are fitted")
     p.add_argument("--judge", type=Path, nargs="+", default=[], help="other records, judged with these weights")
+    p.add_argument("--check", action="store_true", help="fail unless the source has the fitted weights")
     p.add_argument("--table", type=Path, nargs="+", help="records with probabilities that the program stated")
     a = p.parse_args()
     if a.table:
@@ -154,6 +165,8 @@ def main():
     cases = [case_of(r) for r in usable(a.fit)]
     w = fitted(cases)
     print(rust(w) + "\n")
+    if a.check and rust(w) not in "\n".join(x for x in SOURCE.read_text().splitlines() if x.startswith("const ")):
+        sys.exit(f"{SOURCE} has other weights")
     for name, of in (("fitted", cases), ("judged", [case_of(r) for r in usable(a.judge)])):
         if of:
             labels = {k: sum(c[3] == k for c in of) for k in ("leading", "alike", "other", "unknown", "nothing")}

@@ -23,14 +23,13 @@ const SERVO: &str = "servo_";
 /// Smallest probability that is listed.
 const LISTED: f64 = 0.005;
 
-/// Weights of the leading candidate: constant, evidence, refused, small, instability.
-const LEADING: [f64; 5] = [0.0, 1.0, -1.0, -1.0, -1.0];
-/// Logarithm of the odds of an effect that cannot be distinguished from the leading one, relative to that one.
-const ALIKE: f64 = -1.0;
-/// Weights of all other effects together: constant, evidence, refused, small, instability.
-const OTHER: [f64; 5] = [-1.0, 0.5, 0.5, 0.0, 1.0];
-/// Weights of what the catalogue lacks: constant, evidence, refused, verdict `Unexplained`, logarithm of the learnable share.
-const UNKNOWN: [f64; 5] = [-1.0, 0.5, 1.0, 0.0, 0.5];
+/// Weights of the leading candidate, and of each effect that cannot be distinguished from it: constant, evidence, asserted, small,
+/// instability.
+const LEADING: [f64; 5] = [0.10, 2.74, -0.65, -1.51, -0.92];
+/// Weights of all other effects together, in the same order.
+const OTHER: [f64; 5] = [-2.62, 1.18, -0.24, 1.00, 2.28];
+/// Weights of what the catalogue lacks: constant, evidence, asserted, verdict `Unexplained`, logarithm of the learnable share.
+const UNKNOWN: [f64; 5] = [-2.49, 2.11, 2.45, 6.53, 0.35];
 
 /// What may explain the flights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -83,7 +82,7 @@ impl Explanation {
 /// Probabilities of what the model lacks above all, the largest first. `verdict` and `effects` are those of a diagnosis, `learnable`
 /// is the share of the residual that a flexible model still removes. Empty if there is no candidate.
 ///
-/// The probabilities assume flights like those to which the weights were fitted: in a third of them nothing is missing.
+/// Prior probabilities: 1/3 for nothing, 1/2 for an effect of the catalogue, 1/6 for something that it lacks.
 pub fn explanations(verdict: Verdict, effects: &[Candidate], learnable: f64) -> Vec<Explanation> {
     let Some(leading) = effects.first() else { return Vec::new() };
     let logits = logits(verdict, leading, learnable);
@@ -92,7 +91,7 @@ pub fn explanations(verdict: Verdict, effects: &[Candidate], learnable: f64) -> 
         leading
             .indistinguishable_from
             .iter()
-            .map(|id| Explanation::of(id, kind(id), logits.leading + ALIKE)),
+            .map(|id| Explanation::of(id, kind(id), logits.leading)),
     );
     all.push(Explanation::of("nothing", Explained::Nothing, 0.0));
     all.push(Explanation::of("other_effect", Explained::OtherEffect, logits.other));
@@ -126,19 +125,18 @@ fn logits(verdict: Verdict, leading: &Candidate, learnable: f64) -> Logits {
     let instability = 1.0 - if stable.is_finite() { stable } else { UNEXAMINED };
     let slight = leading.heldout_error_reduction < HELD_OUT;
     let small = leading.status == Status::Small || (leading.status == Status::Refused && slight);
-    let refused = leading.status == Status::Refused && !slight;
     let unexplained = verdict == Verdict::Unexplained;
-    let [refused, small, unexplained] =
-        [refused, small, unexplained].map(|x| f64::from(u8::from(x)));
+    let [asserted, small, unexplained] =
+        [leading.asserted, small, unexplained].map(|x| f64::from(u8::from(x)));
     let learnable = learnable.max(LEARNABLE[0]).min(LEARNABLE[1]) / LEARNABLE[0];
     let sum = |weights: &[f64; 5], features: [f64; 5]| -> f64 {
         weights.iter().zip(features).map(|(w, x)| w * x).sum()
     };
-    let checked = [1.0, evidence, refused, small, instability];
+    let checked = [1.0, evidence, asserted, small, instability];
     Logits {
         leading: sum(&LEADING, checked),
         other: sum(&OTHER, checked),
-        unknown: sum(&UNKNOWN, [1.0, evidence, refused, unexplained, learnable.ln()]),
+        unknown: sum(&UNKNOWN, [1.0, evidence, asserted, unexplained, learnable.ln()]),
     }
 }
 
@@ -154,5 +152,66 @@ fn kind(id: &str) -> Explained {
     match id.starts_with(SERVO) || id == askew::ID {
         true => Explained::Installation,
         false => Explained::Aircraft,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn candidate(status: Status, evidence: f64, stable: f64, alike: &[&str]) -> Candidate {
+        Candidate {
+            id: "lift_stall".into(),
+            description: "",
+            asserted: matches!(status, Status::Missing | Status::Indistinguishable),
+            status,
+            evidence,
+            threshold: 10.0,
+            parameters: Vec::new(),
+            channels: Vec::new(),
+            acts: Vec::new(),
+            indistinguishable_from: alike.iter().map(|id| (*id).to_owned()).collect(),
+            heldout_error_reduction: if stable.is_finite() { 0.5 } else { f64::NAN },
+            selected_in_bootstraps: stable,
+            by_flight: Vec::new(),
+            minimum_detectable: None,
+            refused: Vec::new(),
+            curve: None,
+        }
+    }
+
+    fn of(all: &[Explanation], id: &str) -> f64 {
+        all.iter().find(|e| e.id == id).unwrap().probability
+    }
+
+    #[test]
+    fn probabilities_sum_to_one_and_follow_the_evidence() {
+        let clear = candidate(Status::Missing, 5000.0, 1.0, &[]);
+        let clear = explanations(Verdict::Effect, &[clear], 0.0);
+        let sum: f64 = clear.iter().map(|e| e.probability).sum();
+        assert!((sum - 1.0).abs() < 1e-12 && clear[0].id == "lift_stall", "{clear:?}");
+        let weak = candidate(Status::Missing, 20.0, 1.0, &[]);
+        let weak = explanations(Verdict::Effect, &[weak], 0.0);
+        assert!(of(&weak, "lift_stall") < of(&clear, "lift_stall"));
+        let chance = candidate(Status::NotShown, 4.0, f64::NAN, &[]);
+        let chance = explanations(Verdict::Adequate, &[chance], 0.0);
+        assert!(chance[0].kind == Explained::Nothing && chance[0].probability > 0.5);
+        let open = candidate(Status::NotShown, 4.0, f64::NAN, &[]);
+        let open = explanations(Verdict::Unexplained, &[open], 0.4);
+        assert_eq!(open[0].kind, Explained::Unknown);
+    }
+
+    #[test]
+    fn effects_that_cannot_be_distinguished_are_equally_probable() {
+        let tied = candidate(Status::Indistinguishable, 5000.0, 1.0, &["servo_elevator"]);
+        let all = explanations(Verdict::Effect, &[tied], 0.0);
+        assert_eq!(of(&all, "lift_stall"), of(&all, "servo_elevator"));
+        let servo = all.iter().find(|e| e.id == "servo_elevator").unwrap();
+        assert_eq!(servo.kind, Explained::Installation);
+        let said = sentence(&all, true).unwrap();
+        assert!(said.starts_with("Probability of the first: ") && said.ends_with(" %."), "{said}");
+        assert!(
+            explanations(Verdict::Effect, &[], 0.0).is_empty() && sentence(&[], false).is_none()
+        );
     }
 }
