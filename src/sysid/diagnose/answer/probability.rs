@@ -80,11 +80,13 @@ impl Explanation {
 }
 
 /// Probabilities of what the model lacks above all, the largest first. `verdict` and `effects` are those of a diagnosis, `learnable`
-/// is the share of the residual that a flexible model still removes. Empty if there is no candidate.
+/// is the share of the residual that a flexible model still removes. Empty if the verdict is `Unknown` or there is no candidate.
 ///
 /// Prior probabilities: 1/3 for nothing, 1/2 for an effect of the catalogue, 1/6 for something that it lacks.
 pub fn explanations(verdict: Verdict, effects: &[Candidate], learnable: f64) -> Vec<Explanation> {
-    let Some(leading) = effects.first() else { return Vec::new() };
+    let Some(leading) = effects.first().filter(|_| verdict != Verdict::Unknown) else {
+        return Vec::new();
+    };
     let logits = logits(verdict, leading, learnable);
     let mut all = vec![Explanation::of(&leading.id, kind(&leading.id), logits.leading)];
     all.extend(

@@ -11,7 +11,9 @@ use crate::diagnose::answer::measurement;
 use crate::diagnose::answer::per_flight;
 use crate::diagnose::answer::probability;
 use crate::diagnose::answer::ranking;
-use crate::diagnose::answer::result::{ChannelLeft, Diagnosis, Nulls, Settings, Tuned, Verdict};
+use crate::diagnose::answer::result::{
+    ChannelLeft, Decoy, Diagnosis, Nulls, Settings, Tuned, Verdict,
+};
 use crate::diagnose::answer::rival::against_axes;
 use crate::diagnose::answer::sentences::{self, Content, WhyUnknown};
 use crate::diagnose::answer::shares;
@@ -96,15 +98,8 @@ fn of_unknown(
     measurement.extend(per_flight::angles(found.round()));
     let trims = per_flight::trims(found.round());
     let (verdict, why_unknown) = spoken(&found, &doubtful, &channels, faultless);
-    let explanations = match verdict {
-        Verdict::Unknown => Vec::new(),
-        _ => probability::explanations(verdict, &effects, found.learnable()),
-    };
+    let explanations = probability::explanations(verdict, &effects, found.learnable());
     notes.extend(sentences::notes(&found, model, verdict, options));
-    let decoys = match options.detail {
-        Detail::Full => decoys::decoys(&found, options.seed),
-        Detail::Lean => Vec::new(),
-    };
     let findings = sentences::sentences(&Content {
         found: &found,
         verdict,
@@ -131,11 +126,19 @@ fn of_unknown(
         trims,
         tuned,
         nulls: Nulls { count: options.nulls, best: found.nulls.clone(), level: options.level },
-        decoys,
+        decoys: decoys_of(&found, options),
         learnable_remainder: found.learnable(),
         notes,
         settings: settings(options),
     })
+}
+
+/// The placebo regressors; none unless all details are wanted.
+fn decoys_of(found: &Found, options: &Options) -> Vec<Decoy> {
+    match options.detail {
+        Detail::Full => decoys::decoys(found, options.seed),
+        Detail::Lean => Vec::new(),
+    }
 }
 
 /// The forces and moments of `flights`, measured and predicted by `model`.
