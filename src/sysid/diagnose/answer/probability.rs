@@ -130,7 +130,8 @@ fn logits(verdict: Verdict, leading: &Candidate, learnable: f64) -> Logits {
     let unexplained = verdict == Verdict::Unexplained;
     let [asserted, small, unexplained] =
         [leading.asserted, small, unexplained].map(|x| f64::from(u8::from(x)));
-    let learnable = learnable.max(LEARNABLE[0]).min(LEARNABLE[1]) / LEARNABLE[0];
+    let learnable = if learnable.is_finite() { learnable } else { 0.0 };
+    let learnable = learnable.clamp(LEARNABLE[0], LEARNABLE[1]) / LEARNABLE[0];
     let sum = |weights: &[f64; 5], features: [f64; 5]| -> f64 {
         weights.iter().zip(features).map(|(w, x)| w * x).sum()
     };
