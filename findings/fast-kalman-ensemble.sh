@@ -4,7 +4,7 @@
 # with noise, which is not bound. Of a prior variance of 4 and a measurement's of 1 there remains 0.16; it is 0.8, and the mean of this first step is right. The package's linear filter is exact here, and so are its EKF and UKF.
 # From the second step on the mean is wrong too, since the gain follows from that covariance: a constant that is known to 10 and measured with 1 stays near its first measurement. After 100 measurements the error is 0.55 at a claimed 0.06;
 # the right one is 0.10. From an even start it converges, at a rate of its own, with half the variance claimed.
-# Why it matters: a bias of a sensor, a wind, or a derivative is such a constant; the estimate is smooth, plausible, and the first sample. Nothing in nis or ok shows it, and a wider start makes it worse.
+# Why it matters: a bias of a sensor, a wind, or a derivative is such a constant; the estimate is smooth, plausible, and the first sample. A wider start makes it worse.
 # The documentation names the method and does not say it. correct_deterministic_batch() does the same. Instead: the package's UnscentedKalmanFilter, with the same two functions and without their derivatives.
 set -euo pipefail
 folder=$(mktemp -d); trap 'rm -rf "$folder"' EXIT
