@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 /// Allocations from this size on are returned to the system as soon as they are freed, bytes. By default glibc raises the limit to
-/// 32 MB, and an hour's log then keeps 100 MB that nothing uses.
+/// 32 MB, and after an hour's log the program then keeps 80 MB that nothing uses.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const RETURNED: libc::c_int = 8 << 20;
 

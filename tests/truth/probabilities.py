@@ -1,14 +1,16 @@
 """Fits the weights of `src/sysid/diagnose/answer/probability.rs`, and shows how often probabilities of `greylag diagnose` are right.
 
     python tests/truth/probabilities.py --fit hide-and-find.jsonl [--judge official.jsonl]
-    python tests/truth/probabilities.py --table results/probabilities-official.jsonl
+    python tests/truth/probabilities.py --table official.jsonl
 
 The first command reads records of `examples/hide_and_find` or of `score.py`, fits the weights by maximum likelihood and prints them
-as Rust; with --judge it prints the table of other records with them. The second takes the probabilities that the program stated.
+as Rust; with --judge it prints the table of other records with them. The second takes the probabilities that the program stated, and
+fails if they are not those of this script with the program's weights.
 """
 
 import argparse
 import math
+import re
 import sys
 from pathlib import Path
 
@@ -110,6 +112,22 @@ def rust(w):
     return "\n".join(lines)
 
 
+def of_source():
+    """The weights of the program."""
+    lists = dict(re.findall(r"^const ([A-Z]+): \[f64; \d+\] = \[(.*)\];$", SOURCE.read_text(), re.MULTILINE))
+    return np.array([float(x) for name in SIZES for x in lists[name].split(",")])
+
+
+def differs(records):
+    """Largest difference between a probability that the program stated and that of this script with the program's weights."""
+    w, most = of_source(), 0.0
+    for r in records:
+        own = probabilities(w, case_of(r))
+        names = {r["ranked"][0]: "leading", "other_effect": "other"}
+        most = max([most, *(abs(p - own[names.get(name, name if name in own else "alike")]) for name, p in r["explanations"].items())])
+    return most
+
+
 def stated(r):
     """Pairs of a record: probability that the program stated, and whether that explanation is true."""
     *_, label = case_of(r)
@@ -157,8 +175,13 @@ def main():
     p.add_argument("--table", type=Path, nargs="+", help="records with probabilities that the program stated")
     a = p.parse_args()
     if a.table:
-        records = usable(a.table)
-        print(f"{len(records)} cases\n\n" + table([pair for r in records for pair in stated(r)]))
+        records = [r for r in usable(a.table) if r.get("explanations")]
+        if not records:
+            sys.exit("no record there has probabilities of the program")
+        most = differs(records)
+        print(f"{len(records)} cases; largest difference from this script: {most:.1e}\n\n" + table([pair for r in records for pair in stated(r)]))
+        if most > 1e-9:
+            sys.exit("the program and this script compute different probabilities")
         return
     if not a.fit:
         p.error("name records with --fit or --table")

@@ -180,6 +180,7 @@ def by_error(own):
 
 def tables(records):
     """All tables of the records: of sensors as they should be, and of wrong ones."""
+    records = [r for r in records if "without" not in r]  # those are for probabilities.py
     clean = [r for r in records if not r.get("installed")]
     parts = [table(clean), coverage(clean)] if clean else []
     return "\n\n".join([*parts, wrongly_installed(records)]).strip()
@@ -219,18 +220,23 @@ def wilson(held, n, z=1.96):
     return middle - half, middle + half
 
 
-def answered(path, greylag):
-    """The records that an earlier run left of this program, by folder."""
+def answered(path, greylag, without):
+    """The records that an earlier run left of this program and this catalogue, by folder."""
     if not (path and path.exists()):
         return {}
-    return {r["folder"]: r for r in scoring.recorded(path) if r["greylag"] == str(greylag)}
+    return {r["folder"]: r for r in scoring.recorded(path) if r["greylag"] == str(greylag) and ("without" in r) == without}
+
+
+def hides(case):
+    """Whether a case has a hidden effect."""
+    return json.loads((case / "truth.json").read_text())["hidden"] is not None
 
 
 def main():
     """Scores the cases of the command line."""
     p = scoring.arguments(__doc__, jobs=2)
     p.add_argument("--nulls", type=int, help="simulated nulls of each diagnosis; the program's default without")
-    p.add_argument("--without-hidden", action="store_true", help="take the hidden effect out of the catalogue")
+    p.add_argument("--without-hidden", action="store_true", help="score the cases with a hidden effect, which is taken out of the catalogue; not counted in the tables")
     p.add_argument("--resume", action="store_true", help="keep what the JSONL file has of the same program and case")
     p.add_argument("--strict", action="store_true", help="exit with 1 if anything wrong is asserted or a case fails")
     a = p.parse_args()
@@ -239,7 +245,9 @@ def main():
         print(tables(records))
         return
     cases = scoring.folders(p, a)
-    before = answered(a.jsonl, a.greylag) if a.resume else {}
+    if a.without_hidden:
+        cases = [case for case in cases if hides(case)] or sys.exit("no case there has a hidden effect")
+    before = answered(a.jsonl, a.greylag, a.without_hidden) if a.resume else {}
     judge = lambda case: before.get(str(case)) or diagnose(a.greylag, case, a.nulls, a.without_hidden)  # noqa: E731
     records = scoring.score(cases, a, judge, line, before)
     print("\n" + tables(records))
