@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # qsp-orientation 0.1.1 (March 2026), attitude from accelerometer, gyro and magnetometer: Mahony's filter with a magnetometer banks an aircraft that stands level, by half the dip of the Earth's field. In central Europe, with 65 degrees of
 # dip, that is 32.5 degrees: of roll where the aircraft looks east or west, of pitch where it looks north or south, and to the other side in the southern hemisphere. The whole measured field is compared with horizontal north, where its
-# direction in the Earth's axes belongs: the correction from the magnetometer wants to tilt the horizon until the field lies in it, that from gravity wants it level, both have the same weight, and they meet half-way. At the equator, and
-# in a test with a horizontal field, nothing is seen, and the integral, which stands for the gyro's bias, is at rest there: for the filter all is well.
+# direction in the Earth's axes belongs: the correction from the magnetometer wants to tilt the horizon until the field lies in it, that from gravity wants it level, both have the same weight, and they meet half-way. At the magnetic equator,
+# and in a test with a horizontal field, nothing is seen; elsewhere the integral, which stands for the gyro's bias, comes to rest with the tilt: for the filter all is well.
 # The package's Madgwick filter, with the same readings, is level to about a tenth of a degree, as is this one without magnetometer. Nor have the two the same north: Madgwick's is along x, Mahony's along y, and their headings differ by 90
 # degrees, of which nothing is said either.
 # Why it matters: tilt by magnetometer is what no one looks for, since the usual advice is that it corrects the heading only; a log that is replayed through this filter has a bank that turns into a pitch as the heading turns.
