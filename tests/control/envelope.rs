@@ -238,6 +238,38 @@ fn a_limited_lqi_does_not_wind_up() {
     assert!(bare.iter().any(|f| passed(&f.quality)), "the limiter has nothing to do");
 }
 
+/// A turn near the largest bank is held behind the limiter. The integral of the roll error, grown while rolling in, demanded a
+/// bank beyond the limit and stayed, because its increments were undone there: from 58° on `lqi-damped` stayed at 63.6°, where
+/// the load factor does not carry the aircraft, and dived.
+#[test]
+fn a_steep_turn_is_held() {
+    for file in ["jsbsim.toml", "learned/model.toml"] {
+        let model = model(file);
+        for kind in [ControllerKind::Lqi, ControllerKind::LqiDamped] {
+            let source = Source { model: &model, agent: None, changes: &[] };
+            let mut guarded = Guarded::new(build(kind, source).unwrap(), &model);
+            for attitude in [[59.3, 3.2], [-59.3, -10.0]] {
+                let off = settled(&mut guarded, attitude);
+                assert!(off < 0.5, "{kind} on {file} at {attitude:?}: {off}");
+            }
+        }
+    }
+}
+
+/// The attitude error (degrees) 12 s after a roll-in from level flight at 20 m/s.
+fn settled(controller: &mut dyn Controller, attitude: [f64; 2]) -> f64 {
+    let start = Start { airspeed_mps: 20.0, ..Start::NEUTRAL };
+    let mut world = Simulator::new(&PlantOptions { start, ..PlantOptions::default() }).unwrap();
+    let mut seen = world.reset().unwrap();
+    controller.reset(1);
+    let target = target(attitude);
+    for _ in 0..1200 {
+        seen = world.step(controller.command(&seen, &target)).unwrap();
+    }
+    let s = seen.state;
+    (s.roll - target.roll).abs().max((s.pitch - target.pitch).abs()).to_degrees()
+}
+
 /// The planner that flies by default keeps to the envelope, overshoots in fewer steps than the LQI, and is at the target sooner
 /// in the mean.
 #[test]

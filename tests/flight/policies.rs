@@ -101,6 +101,16 @@ fn an_aircraft_that_rolled_onto_its_back_while_nothing_was_heard_of_it_recovers_
 }
 
 #[test]
+fn a_turn_near_the_largest_bank_is_held() {
+    // found by a search, without any fault: the roll integral held 63.6 degrees of bank, the nose fell, and the aircraft dived
+    let damped = companion_with(ControllerKind::LqiDamped, &x8(), Path::new(POLICY)).unwrap();
+    let factory = CompanionFactory::new(damped, &x8()).unwrap();
+    let scenario = include_str!("../data/scenarios/steep-turn.json");
+    let scenario: Scenario = serde_json::from_str(scenario).unwrap();
+    assert_eq!(broken(&factory, &scenario), [""; 0]);
+}
+
+#[test]
 fn turbulence_is_no_oscillation() {
     let factory = CompanionFactory::new(lqi(), &x8()).unwrap();
     let swings =

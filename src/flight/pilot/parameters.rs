@@ -80,12 +80,8 @@ pub(super) fn changed(
     }
     match config.check() {
         Ok(()) => Ok(config),
-        Err(error) => denied(format!("{}: {error}", name(index))),
+        Err(error) => denied(error.to_string()),
     }
-}
-
-fn name(index: usize) -> &'static str {
-    REALS.get(index).map_or("GL_THRUST_SRC", |(name, ..)| name)
 }
 
 fn denied(words: String) -> Result<Config, Verdict> {

@@ -1,7 +1,7 @@
 //! The command protocol: every command for this component is acknowledged, including unknown commands.
 
 use super::{Clients, Now};
-use crate::autopilot::{Autopilot, Mode, Verdict};
+use crate::autopilot::{Autopilot, Mode, Status, Verdict};
 use crate::framing::{Source, Version};
 use crate::wire::Message;
 use crate::wire::answer::{self, CommandResult};
@@ -20,6 +20,21 @@ const AVAILABLE_MODES: u32 = 435;
 /// Commands with a side effect: NAV_LOITER_UNLIM, NAV_RETURN_TO_LAUNCH, DO_SET_MODE, COMPONENT_ARM_DISARM. All other
 /// supported commands may be repeated without harm.
 const CHANGING: [u16; 4] = [17, 20, 176, 400];
+
+/// Reason for which a retransmission is rejected.
+const ENDED: &str = "Command repeated after its effect ended: send it again";
+
+/// Whether the effect of the accepted `command` lasts. Commands without a lasting effect count as in force.
+fn in_force(command: &CommandRequest, status: &Status) -> bool {
+    let [first, second, third, ..] = command.params;
+    match command.number {
+        17 => status.mode == Mode::Hold,
+        20 => status.mode == Mode::Return,
+        176 => mode::from_do_set_mode(first, second, third) == ModeRequest::Known(status.mode),
+        400 => status.armed == (first == 1.0),
+        _ => true,
+    }
+}
 
 /// Result of a command: the acknowledgement, requested messages, and the reason for a refusal.
 struct Outcome {
@@ -68,7 +83,8 @@ fn message_number(parameter: f64) -> Option<u32> {
 
 impl Clients {
     /// Carries out a command and acknowledges it. A retransmission has a confirmation above 0. If the command was
-    /// already carried out, a retransmission gets the same result and has no further effect.
+    /// already carried out, a retransmission gets the same result and has no further effect. If its effect has ended since, it
+    /// is temporarily rejected: a late retransmission must not undo what happened in between, and is not in force either.
     pub(super) fn command(
         &mut self,
         now: Now,
@@ -78,7 +94,13 @@ impl Clients {
         autopilot: &mut dyn Autopilot,
     ) {
         if let Some(result) = self.sessions[at].answered(now.host, &command) {
+            let in_force = in_force(&command, &autopilot.status());
+            let result = if in_force { result } else { CommandResult::TemporarilyRejected };
             self.reply(at, &answer::command_ack(command.number, result, from));
+            if !in_force {
+                self.sessions[at].forget_command();
+                self.complain(now, at, ENDED);
+            }
             return;
         }
         let outcome = self.carry_out(now, at, &command, autopilot);

@@ -157,6 +157,11 @@ impl Session {
         self.last_command = Some((command, result, host));
     }
 
+    /// Discards the stored command. The same command is then carried out anew.
+    pub fn forget_command(&mut self) {
+        self.last_command = None;
+    }
+
     /// Starts the transfer of the whole parameter table.
     pub fn list_parameters(&mut self) {
         self.listing = Some(0);

@@ -184,7 +184,7 @@ fn vfr_hud(status: &Status) -> MavMessage {
         groundspeed: north.hypot(east) as f32,
         alt: status.altitude as f32,
         climb: -down as f32,
-        heading: status.attitude[2].to_degrees().rem_euclid(360.0) as i16,
+        heading: status.attitude[2].to_degrees().rem_euclid(360.0).round() as i16 % 360,
         throttle: (status.command.throttle * 100.0).round() as u16,
     })
 }
