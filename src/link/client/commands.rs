@@ -22,7 +22,7 @@ const AVAILABLE_MODES: u32 = 435;
 const CHANGING: [u16; 4] = [17, 20, 176, 400];
 
 /// Reason for which a retransmission is rejected.
-const ENDED: &str = "Command repeated after its effect ended: send it again";
+const ENDED: &str = "Repeated command: its effect ended; send it anew";
 
 /// Whether the effect of the accepted `command` lasts. Commands without a lasting effect count as in force.
 fn in_force(command: &CommandRequest, status: &Status) -> bool {
