@@ -21,8 +21,6 @@ What a user of MAVROS meets:
 - For such an autopilot MAVROS waits for an acknowledgement only where `confirmation` is 1. Otherwise it says success at once, also
   for what is refused, and logs "CMD: Unexpected command 176, result 1". set_message_interval is one of these: the companion
   streams no HIGHRES_IMU and no LOCAL_POSITION_NED, so imu/data_raw and local_position/* stay silent, whatever it answers.
-- A command with a confirmation above 0 is a retransmission by MAVLink: within 3 s of the same accepted one the companion repeats
-  the answer and does nothing. If the mode has ended since (lost setpoints), it rejects the first one with a text; send it again.
 - Setpoints of rates, positions, velocities and accelerations are refused with a text; of texts above 50 characters MAVROS shows
   the parts one by one. The battery is shown as 0 V, which is MAVROS's reading of "unknown".
 - "Falling back to MISSION_ITEM" is harmless: there are no missions.

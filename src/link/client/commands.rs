@@ -82,9 +82,9 @@ fn message_number(parameter: f64) -> Option<u32> {
 }
 
 impl Clients {
-    /// Carries out a command and acknowledges it. A retransmission has a confirmation above 0. If the command was
-    /// already carried out, a retransmission gets the same result and has no further effect. If its effect has ended since, it
-    /// is temporarily rejected: a late retransmission must not undo what happened in between, and is not in force either.
+    /// Carries out a command and acknowledges it. A retransmission has a larger confirmation than the command that was
+    /// carried out. It gets the same result and has no further effect. If the effect has ended since, it is temporarily
+    /// rejected: a late retransmission must not undo what happened in between.
     pub(super) fn command(
         &mut self,
         now: Now,
@@ -98,7 +98,6 @@ impl Clients {
             let result = if in_force { result } else { CommandResult::TemporarilyRejected };
             self.reply(at, &answer::command_ack(command.number, result, from));
             if !in_force {
-                self.sessions[at].forget_command();
                 self.complain(now, at, ENDED);
             }
             return;

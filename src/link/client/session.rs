@@ -144,22 +144,19 @@ impl Session {
         allowed
     }
 
-    /// If `command` is a retransmission, returns the result that was sent before; otherwise `None`.
+    /// If `command` is a retransmission, returns the result that was sent before; otherwise `None`. A retransmission has a larger
+    /// confirmation than the command that was carried out. MAVROS begins with 1, so that a new request has 1 again.
     pub fn answered(&self, host: Duration, command: &CommandRequest) -> Option<CommandResult> {
         let (known, result, when) = self.last_command.as_ref()?;
         let same_bits = known.params.map(f64::to_bits) == command.params.map(f64::to_bits);
-        let again = command.confirmation > 0 && known.number == command.number && same_bits;
+        let later = command.confirmation > known.confirmation;
+        let again = later && known.number == command.number && same_bits;
         (again && host.saturating_sub(*when) < COMMAND_MEMORY).then_some(*result)
     }
 
     /// Stores the result of a command, in case the command is retransmitted.
     pub fn remember(&mut self, host: Duration, command: CommandRequest, result: CommandResult) {
         self.last_command = Some((command, result, host));
-    }
-
-    /// Discards the stored command. The same command is then carried out anew.
-    pub fn forget_command(&mut self) {
-        self.last_command = None;
     }
 
     /// Starts the transfer of the whole parameter table.
