@@ -1,11 +1,11 @@
 """Settled error of several controllers, target by target, and what each differs from the first by.
 
     python python/benches/paired_targets.py write results/campaign-paper-targets.csv policy=A/evaluation.json hybrid=B/evaluation.json
-    python python/benches/paired_targets.py print results/campaign-paper-targets.csv
+    python python/benches/paired_targets.py print results/campaign-paper-targets.csv [CONTROLLER]
 
 ``write`` keeps the settled errors (degrees) of evaluations (``greylag evaluate --json``) in one table, of the targets that all of them
 have. ``print``
-gives each controller's mean error and the mean of its differences from the first controller, paired by target, with 95 %
+gives each controller's mean error and the mean of its differences from the first one, or from CONTROLLER, paired by target, with 95 %
 percentile-bootstrap intervals over the targets (10,000 resamples, seed 1). These intervals hold no scatter of training: for one
 policy they say what other targets would give, not what another seed would.
 """
@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-USAGE = "give write TABLE.csv NAME=EVALUATION.json …, or print TABLE.csv"
+USAGE = "give write TABLE.csv NAME=EVALUATION.json …, or print TABLE.csv [CONTROLLER]"
 
 
 def write(table: Path, named: list[str]) -> None:
@@ -44,20 +44,23 @@ def with_interval(values: np.ndarray) -> str:
     return f"{values.mean():.3f} [{low:.3f}, {high:.3f}]"
 
 
-def show(table: Path) -> None:
-    """Prints the means and differences of all groups."""
+def show(table: Path, than: str | None = None) -> None:
+    """Prints the means of all groups, and the differences from the controller ``than`` (the first one where it is None)."""
     with table.open() as read:
         rows = list(csv.DictReader(read))
     names = [name for name in rows[0] if name not in ("group", "roll_deg", "pitch_deg")]
+    than = than or names[0]
+    if than not in names:
+        raise SystemExit(f"{table} has no controller {than}; it has {', '.join(names)}")
     groups = list(dict.fromkeys(row["group"] for row in rows))
     for group in ["all", *groups]:
         own = [row for row in rows if group in ("all", row["group"])]
-        first = np.array([float(row[names[0]]) for row in own])
+        first = np.array([float(row[than]) for row in own])
         print(f"\n{group}, {len(own)} targets: settled error, degrees\n")
-        print(f"| controller | mean | less {names[0]} |\n|---|---|---|")
+        print(f"| controller | mean | less {than} |\n|---|---|---|")
         for name in names:
             errors = np.array([float(row[name]) for row in own])
-            less = "–" if name == names[0] else with_interval(errors - first)
+            less = "–" if name == than else with_interval(errors - first)
             print(f"| `{name}` | {with_interval(errors)} | {less} |")
 
 
@@ -68,6 +71,8 @@ def main() -> None:
             write(Path(table), named)
         case ["print", table]:
             show(Path(table))
+        case ["print", table, than]:
+            show(Path(table), than)
         case _:
             raise SystemExit(USAGE)
 

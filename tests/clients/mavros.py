@@ -232,7 +232,6 @@ def main():
     if rospy.get_param("/mavros/setpoint_attitude/use_quaternion", False):
         fly_attitude("setpoint_attitude/attitude", -25.0, 3.0).stop()
         until(lambda: in_mode(HOLD), 3.0)
-        time.sleep(3.0)
     else:
         print("note  setpoint_attitude/attitude is not flown: use_quaternion is false", flush=True)
 

@@ -9,11 +9,18 @@ import math
 import subprocess
 import sys
 import tempfile
+from functools import cache
 from pathlib import Path
 
 import installed
 import scoring
 from hidden import PARAMETERS
+
+
+@cache
+def build_of(greylag):
+    """Version and commit of the program; records hold no path of a machine."""
+    return subprocess.run([greylag, "--version"], capture_output=True, text=True, check=True).stdout.strip()
 
 
 def diagnose(greylag, case, nulls, without=False):
@@ -29,7 +36,7 @@ def diagnose(greylag, case, nulls, without=False):
             command += ["--without", truth["hidden"]]
         done = subprocess.run([str(x) for x in command], capture_output=True, text=True)
         said = json.loads(out.read_text()) if out.exists() else None
-    record = {"greylag": str(greylag), "folder": str(case)}
+    record = {"greylag": build_of(str(greylag)), "folder": f"{case.parent.name}/{case.name}"}
     record |= {"case": truth["case"], "truth": truth["truth"], "seed": truth["seed"], "hidden": truth["hidden"]}
     record.update(amount=truth["amount"], sensors=truth["sensors"], exit=done.returncode)
     record |= {k: truth[k] for k in ("strength",) if k in truth} | ({"without": truth["hidden"]} if without else {})
