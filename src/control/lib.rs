@@ -69,6 +69,13 @@ pub struct Overruled {
     pub flown: Command,
 }
 
+/// Whether an increment of an integral led its command further beyond the limit that changed the command. `moved` is the flown
+/// minus the wanted command, `effect` the change of the command by the increment, in the same unit. Only such an increment is
+/// undone: one that leads back must remain, or an integral that demands more than the limit never falls.
+pub(crate) fn winds_up(moved: f64, effect: f64) -> bool {
+    moved * effect < 0.0
+}
+
 /// A control law, called every 10 ms of vehicle time.
 ///
 /// Order of calls: [`Controller::reset`] before the first tick after the controller takes over, then [`Controller::command`]

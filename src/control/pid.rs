@@ -1,6 +1,6 @@
 //! PID controller with three independent loops: roll by aileron, pitch by elevator, airspeed by throttle.
 
-use crate::{Controller, Observation, Overruled, Target};
+use crate::{Controller, Observation, Overruled, Target, winds_up};
 use greylag_model::STEP;
 use greylag_physics::Command;
 
@@ -132,11 +132,9 @@ impl Controller for Pid {
             return;
         }
         let Overruled { wanted, flown } = by;
-        for (axis, stopped) in [wanted.aileron != flown.aileron, wanted.elevator != flown.elevator]
-            .into_iter()
-            .enumerate()
-        {
-            if stopped {
+        let moved = [flown.aileron - wanted.aileron, flown.elevator - wanted.elevator];
+        for (axis, gains) in [self.tuning.roll, self.tuning.pitch].into_iter().enumerate() {
+            if winds_up(moved[axis], gains.ki * self.added[axis]) {
                 self.integrals[axis] -= std::mem::take(&mut self.added[axis]);
             }
         }

@@ -9,7 +9,7 @@ mod riccati;
 
 use std::sync::Arc;
 
-use crate::{Controller, Observation, Overruled, SetupError, Target};
+use crate::{Controller, Observation, Overruled, SetupError, Target, winds_up};
 pub(crate) use ahead::Ahead;
 use ahead::{HOLD, Inner, Law, Surfaces};
 pub use design::Weights;
@@ -184,7 +184,7 @@ impl Controller for Lqi {
     /// Anti-windup by conditioning (Hanus, Kinnaert and Henrotte, Automatica 23, 1987). If another aileron or elevator command
     /// was flown, the reference of that axis moves to the value that would have given the flown command, but not past the
     /// aircraft's attitude. The last increment of the axis's integral is subtracted again if it moved the command further beyond
-    /// the limit. An increment in the other direction remains: without it an integral that demands more than the limit would stay.
+    /// the limit.
     fn overruled(&mut self, by: &Overruled) {
         let (Some(last), Some(reference)) = (self.last.take(), &mut self.reference) else { return };
         let Overruled { wanted, flown } = by;
@@ -201,7 +201,7 @@ impl Controller for Lqi {
             }
             let (here, there) = (last.attitude[axis], reference[axis]);
             reference[axis] = (there + back).clamp(here.min(there), here.max(there));
-            if last.added[axis] * back > 0.0 {
+            if winds_up(moved[axis], -last.by_reference[axis] * last.added[axis]) {
                 self.integral[axis] -= last.added[axis];
             }
         }

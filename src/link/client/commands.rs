@@ -24,15 +24,23 @@ const CHANGING: [u16; 4] = [17, 20, 176, 400];
 /// Reason for which a retransmission is rejected.
 const ENDED: &str = "Repeated command: its effect ended; send it anew";
 
-/// Whether the effect of the accepted `command` lasts. Commands without a lasting effect count as in force.
-fn in_force(command: &CommandRequest, status: &Status) -> bool {
+/// The mode that `command` requests; `None` if it requests none.
+fn requested_mode(command: &CommandRequest) -> Option<ModeRequest> {
     let [first, second, third, ..] = command.params;
     match command.number {
-        17 => status.mode == Mode::Hold,
-        20 => status.mode == Mode::Return,
-        176 => mode::from_do_set_mode(first, second, third) == ModeRequest::Known(status.mode),
-        400 => status.armed == (first == 1.0),
-        _ => true,
+        // NAV_LOITER_UNLIM, NAV_RETURN_TO_LAUNCH, DO_SET_MODE
+        17 => Some(ModeRequest::Known(Mode::Hold)),
+        20 => Some(ModeRequest::Known(Mode::Return)),
+        176 => Some(mode::from_do_set_mode(first, second, third)),
+        _ => None,
+    }
+}
+
+/// Whether the effect of the accepted `command` (mode or arming) lasts.
+fn in_force(command: &CommandRequest, status: &Status) -> bool {
+    match requested_mode(command) {
+        Some(mode) => mode == ModeRequest::Known(status.mode),
+        None => status.armed == (command.params[0] == 1.0),
     }
 }
 
@@ -133,18 +141,16 @@ impl Clients {
         command: &CommandRequest,
         autopilot: &mut dyn Autopilot,
     ) -> Outcome {
-        let [first, second, third, ..] = command.params;
-        match command.number {
-            // NAV_LOITER_UNLIM, NAV_RETURN_TO_LAUNCH
-            17 => autopilot.set_mode(now.vehicle, Mode::Hold).into(),
-            20 => autopilot.set_mode(now.vehicle, Mode::Return).into(),
-            // DO_SET_MODE
-            176 => match mode::from_do_set_mode(first, second, third) {
+        if let Some(request) = requested_mode(command) {
+            return match request {
                 ModeRequest::Known(mode) => autopilot.set_mode(now.vehicle, mode).into(),
                 ModeRequest::Unknown => {
                     Outcome::denied("Mode refused: not a mode of this autopilot")
                 }
-            },
+            };
+        }
+        let [first, second, ..] = command.params;
+        match command.number {
             // COMPONENT_ARM_DISARM
             400 if first == 1.0 => autopilot.arm(now.vehicle, second == FORCE).into(),
             400 if first == 0.0 => autopilot.disarm(now.vehicle, second == FORCE).into(),
