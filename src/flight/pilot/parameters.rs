@@ -133,7 +133,7 @@ mod tests {
         let Err(Verdict::Denied(words)) = changed(&config, 2, ParameterValue::Real(90.0)) else {
             panic!()
         };
-        assert!(words.contains("GL_BANK_MAX_DEG") && words.contains("80"), "{words}");
+        assert!(words.contains("bank_max_deg") && words.contains("80"), "{words}");
         for bad in [f32::NAN, f32::INFINITY, -1e30] {
             assert!(changed(&config, 0, ParameterValue::Real(bad)).is_err());
         }
