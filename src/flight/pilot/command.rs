@@ -3,12 +3,15 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3};
 
-use super::{Pilot, Plan, Source, due, within};
+use super::oscillation::Oscillation;
+use super::{Pending, Pilot, Plan, Source, due, within};
 use greylag_control::Observation;
 use greylag_link::autopilot::Severity;
-use greylag_link::vehicle::Axis;
+use greylag_link::vehicle::{Axis, Fault};
 use greylag_physics::{Command, Time};
 
+/// An oscillation counts as persistent if it recurs within this time, s.
+const SWINGS_AGAIN_S: f64 = 20.0;
 /// After an oscillation, the deviations of the surface commands from their running mean are multiplied by this factor. The
 /// loop gain at the frequency of the oscillation falls to a third, and the delay margin grows about threefold.
 const REDUCED_GAIN: f64 = 1.0 / 3.0;
@@ -22,8 +25,26 @@ const REDUCED_S: f64 = 5.0;
 const UPSET: [f64; 2] = [FRAC_PI_2, FRAC_PI_3];
 
 impl Pilot {
+    /// Reduces the gain for a while if the flown commands oscillate. If the oscillation recurs within 20 s and a flight
+    /// controller can take over, control is returned to the flight controller.
+    pub(super) fn guard(&mut self) {
+        let Pending::Fly { seen, .. } = &self.pending else { return };
+        if self.by_attitude {
+            return;
+        }
+        let (time, step) = (seen.time, self.limits.surface_step);
+        let found = self.oscillation.see(time, &seen.state, &self.before, &self.in_force, step);
+        let Some((axis, lasted_s)) = found else { return };
+        self.oscillation = Oscillation::default();
+        if self.hands_back && within(self.oscillated, time, SWINGS_AGAIN_S) {
+            self.refused = Some(Fault::Oscillation(axis));
+        } else {
+            self.reduce_gain(axis, lasted_s, time);
+        }
+    }
+
     /// Reduces the gain from `time` on. The loop about `axis` has oscillated for `lasted_s` seconds.
-    pub(super) fn reduce_gain(&mut self, axis: Axis, lasted_s: f64, time: Time) {
+    fn reduce_gain(&mut self, axis: Axis, lasted_s: f64, time: Time) {
         self.oscillated = Some(time);
         let axis = match axis {
             Axis::Roll => "roll",

@@ -37,6 +37,14 @@ impl Pilot {
             self.texts.say(Severity::Error, format!("vehicle state refused: {reason}"));
         }
     }
+
+    /// Reports the measurements of angle of attack and airspeed that control no longer uses, or uses again.
+    pub(super) fn report_air_data(&mut self) {
+        for change in self.estimate.take_air_data_changes() {
+            let severity = if change.is_refusal() { Severity::Error } else { Severity::Info };
+            self.texts.say(severity, change.words());
+        }
+    }
 }
 
 /// Whether a warning that was last sent at `last` may be sent again at `now`. If so, sets `last` to `now`.

@@ -3,7 +3,8 @@
 
 use std::time::Duration;
 
-use super::lift::{ByLift, LiftCurve};
+use super::air_data::{AirDataCheck, Change};
+use super::lift::LiftCurve;
 use super::telemetry::{defect, repeats};
 use greylag_link::vehicle::Telemetry;
 use greylag_physics::{State, Time};
@@ -34,9 +35,9 @@ pub(super) struct Estimate {
     usable_at: Option<Time>,
     fresh_at: Option<Time>,
     frozen: bool,
-    by_lift: ByLift,
-    /// Angle of attack for control in `last`, rad.
-    alpha: f64,
+    air_data: AirDataCheck,
+    /// Angle of attack (rad) and airspeed (m/s) for control in `last`.
+    air: [f64; 2],
 }
 
 impl Estimate {
@@ -57,7 +58,7 @@ impl Estimate {
         let frozen = self.last.is_some_and(|last| repeats(frame, &last));
         self.frozen = frozen;
         self.last = Some(*frame);
-        self.alpha = self.by_lift.alpha(curve, frame);
+        self.air = self.air_data.for_control(curve, frame);
         self.usable_at = Some(now);
         if frozen {
             return Frame::Frozen;
@@ -94,10 +95,16 @@ impl Estimate {
         self.last.as_ref()
     }
 
-    /// The last frame, with the angle of attack for control ([`ByLift`]).
+    /// The last frame, with angle of attack and airspeed for control ([`AirDataCheck`]).
     pub(super) fn for_control(&self) -> Option<Telemetry> {
-        let with = |last: Telemetry| State { alpha: self.alpha, ..last.state };
+        let [alpha, airspeed] = self.air;
+        let with = |last: Telemetry| State { alpha, airspeed, ..last.state };
         self.last.map(|last| Telemetry { state: with(last), ..last })
+    }
+
+    /// Takes the changes in the use of measured air data since the last call.
+    pub(super) fn take_air_data_changes(&mut self) -> Vec<Change> {
+        self.air_data.take_changes()
     }
 
     /// Whether a usable state arrived within `limit_s` before `now`.

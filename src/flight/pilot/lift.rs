@@ -1,4 +1,4 @@
-//! Angle of attack for control where no vane measures it: the link's estimate, corrected by the measured lift.
+//! Angle of attack that the measured lift corrects, for control where no vane measures it or the vane is refused.
 //!
 //! The link estimates the angle of attack from attitude and climb rate. Air that rises by 1 m/s then counts as 3° at 20 m/s.
 //! Beside ArduPlane in light turbulence the error reached 12°, and the elevator that answered it pitched the aircraft up by 60°.
@@ -6,7 +6,7 @@
 //! model's lift is wrong by 10 %, the angle is wrong by 0.7° in level flight of the X8. Records, the monitor and diagnoses keep the
 //! link's estimate, because an angle from the model's lift would agree with this lift.
 
-use greylag_link::vehicle::{Faults, Telemetry, VANE_SD};
+use greylag_link::vehicle::{Faults, Telemetry};
 use greylag_model::{GreyBox, Trim, TrimError, Twin};
 use greylag_physics::atmosphere::standard_density;
 use greylag_physics::{State, Time};
@@ -27,7 +27,7 @@ const GAP_S: f64 = 0.5;
 /// Largest correction, rad.
 const MOST: f64 = 15.0 * DEGREE;
 /// Lowest airspeed at which the lift is used, m/s.
-const SLOWEST_MPS: f64 = 5.0;
+pub(super) const SLOWEST_MPS: f64 = 5.0;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// Lift of a model in straight flight: upward specific force by dynamic pressure (m/s² per Pa) over the angle of attack.
@@ -77,6 +77,21 @@ impl LiftCurve {
         }))
     }
 
+    /// Upward specific force by dynamic pressure (m/s² per Pa) at an angle of attack and an elevator deflection, rad. Beyond the
+    /// ends of the rising part it is that of the end.
+    pub(super) fn lift(&self, alpha: f64, elevator: f64) -> f64 {
+        let last = (self.rising.len() - 1) as f64;
+        let place = ((alpha - self.from) / (SPACING_DEG * DEGREE)).clamp(0.0, last);
+        let k = (place as usize).min(self.rising.len() - 2);
+        let [low, high] = [self.rising[k], self.rising[k + 1]];
+        low + (high - low) * (place - k as f64) + self.by_elevator * (elevator - self.trim)
+    }
+
+    /// Lift by dynamic pressure at the end of the rising part, m/s² per Pa.
+    pub(super) fn largest(&self) -> f64 {
+        self.rising[self.rising.len() - 1]
+    }
+
     /// Angle of attack (rad) with the upward specific force `lift` by dynamic pressure, at the elevator deflection `elevator`
     /// (rad). Beyond the ends of the rising part it is that of the end.
     fn angle(&self, lift: f64, elevator: f64) -> f64 {
@@ -88,7 +103,7 @@ impl LiftCurve {
     }
 }
 
-/// The correction of the link's angle of attack.
+/// The correction of an estimated angle of attack by the measured lift.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ByLift {
     /// Time of the last state, and the correction then, rad.
@@ -96,12 +111,14 @@ pub(super) struct ByLift {
 }
 
 impl ByLift {
-    /// Angle of attack for control, rad: that of a vane, or the link's estimate in `frame`, corrected by the lift of `curve`.
-    pub(super) fn alpha(&mut self, curve: Option<&LiftCurve>, frame: &Telemetry) -> f64 {
-        let estimated = frame.state.alpha;
-        let Some(curve) = curve.filter(|_| frame.incidence_sd[0] > VANE_SD[0]) else {
-            return estimated;
-        };
+    /// The angle of attack `estimated` (rad) in `frame`, corrected by its lift at the true airspeed `airspeed` (m/s).
+    pub(super) fn alpha(
+        &mut self,
+        curve: &LiftCurve,
+        frame: &Telemetry,
+        estimated: f64,
+        airspeed: f64,
+    ) -> f64 {
         let (mut added, mut step) = (0.0, 0.0);
         if let Some((before, last)) = self.last {
             let passed = frame.time.since(before).as_secs_f64();
@@ -109,7 +126,7 @@ impl ByLift {
                 (added, step) = (last, passed);
             }
         }
-        let (airspeed, down) = (frame.state.airspeed, frame.specific_force[2]);
+        let down = frame.specific_force[2];
         let whole = !frame.faults.contains(Faults::SPECIFIC_FORCE) && airspeed > SLOWEST_MPS;
         let pressure = 0.5 * standard_density(frame.altitude) * airspeed * airspeed;
         let lift = -down / pressure;
@@ -134,6 +151,10 @@ mod tests {
     fn model() -> GreyBox {
         let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
         GreyBox::load(&std::path::Path::new(root).join("params/x8/jsbsim.toml")).unwrap()
+    }
+
+    fn corrected(by_lift: &mut ByLift, curve: &LiftCurve, frame: &Telemetry) -> f64 {
+        by_lift.alpha(curve, frame, frame.state.alpha, frame.state.airspeed)
     }
 
     /// A state in level flight at 20 m/s, `k` hundredths of a second after the first, with the link's estimate of the angle of attack
@@ -167,29 +188,37 @@ mod tests {
         let (mut by_lift, mut alpha) = (ByLift::default(), 0.0);
         for k in 0..100 {
             // the air rises by 3.5 m/s
-            alpha = by_lift.alpha(Some(&curve), &frame(&model, k, 0.03 + 0.175, 0.03));
+            alpha = corrected(&mut by_lift, &curve, &frame(&model, k, 0.03 + 0.175, 0.03));
         }
         assert!((alpha - 0.03).to_degrees().abs() < 0.3, "{}", alpha.to_degrees());
         // without an accelerometer the estimate is believed again
         for k in 100..1100 {
             let mut blind = frame(&model, k, 0.1, 0.03);
             blind.faults.insert(Faults::SPECIFIC_FORCE);
-            alpha = by_lift.alpha(Some(&curve), &blind);
+            alpha = corrected(&mut by_lift, &curve, &blind);
         }
         assert!((alpha - 0.1).to_degrees().abs() < 0.1, "{}", alpha.to_degrees());
     }
 
     #[test]
-    fn a_vane_is_believed_and_what_is_no_number_corrects_nothing() {
+    fn what_is_no_number_corrects_nothing() {
         let model = model();
         let curve = LiftCurve::of(&model, 20.0).unwrap().unwrap();
         let mut by_lift = ByLift::default();
-        let vane = Telemetry { incidence_sd: VANE_SD, ..frame(&model, 0, 0.2, 0.03) };
-        assert_eq!(by_lift.alpha(Some(&curve), &vane), 0.2);
-        assert_eq!(by_lift.alpha(None, &frame(&model, 1, 0.2, 0.03)), 0.2);
-        for k in 2..50 {
+        for k in 0..50 {
             let bad = Telemetry { specific_force: [f64::NAN; 3], ..frame(&model, k, 0.2, 0.03) };
-            assert_eq!(by_lift.alpha(Some(&curve), &bad), 0.2);
+            assert_eq!(corrected(&mut by_lift, &curve, &bad), 0.2);
         }
+    }
+
+    #[test]
+    fn lift_and_angle_are_inverse_on_the_rising_part() {
+        let curve = LiftCurve::of(&model(), 20.0).unwrap().unwrap();
+        for (degrees, elevator) in [(-5.0, 0.0), (0.0, 0.1), (3.3, -0.1), (10.0, 0.05)] {
+            let alpha = degrees * DEGREE;
+            let again = curve.angle(curve.lift(alpha, elevator), elevator);
+            assert!((again - alpha).abs() < 1e-9, "{degrees} {}", again.to_degrees());
+        }
+        assert!(curve.largest() >= curve.lift(3.0, curve.trim));
     }
 }

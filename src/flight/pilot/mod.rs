@@ -8,6 +8,7 @@
 //!    late, or not finite         no usable state    no usable state for over 50 ms
 //! ```
 
+mod air_data;
 mod command;
 mod complaints;
 mod config;
@@ -49,9 +50,6 @@ use oscillation::Oscillation;
 use polarity::Check;
 use programme::Programme;
 use texts::Texts;
-
-/// An oscillation counts as persistent if it recurs within this time, s.
-const SWINGS_AGAIN_S: f64 = 20.0;
 
 /// The pilot of one aircraft.
 ///
@@ -250,6 +248,7 @@ impl Pilot {
         }
         self.advance(now);
         let quality = self.estimate.take(now, frame, self.config.lift.as_ref());
+        self.report_air_data();
         self.excuse_stillness(quality, now);
         self.answering = frame.time;
         self.watch_return();
@@ -299,24 +298,6 @@ impl Pilot {
             check.commanded(time, self.in_force);
         }
         self.decision()
-    }
-
-    /// Reduces the gain for a while if the flown commands oscillate. If the oscillation recurs within 20 s and a flight
-    /// controller can take over, control is returned to the flight controller.
-    fn guard(&mut self) {
-        let Pending::Fly { seen, .. } = &self.pending else { return };
-        if self.by_attitude {
-            return;
-        }
-        let (time, step) = (seen.time, self.limits.surface_step);
-        let found = self.oscillation.see(time, &seen.state, &self.before, &self.in_force, step);
-        let Some((axis, lasted_s)) = found else { return };
-        self.oscillation = Oscillation::default();
-        if self.hands_back && within(self.oscillated, time, SWINGS_AGAIN_S) {
-            self.refused = Some(Fault::Oscillation(axis));
-        } else {
-            self.reduce_gain(axis, lasted_s, time);
-        }
     }
 
     /// Stores the recent processing time of the control task as a fraction of its cycle, 0..1, for the status.
