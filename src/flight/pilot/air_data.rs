@@ -7,6 +7,7 @@
 //! changes measurement and lift together, and a stall measurement and flow. PX4 and ArduPilot check airspeed sensors similarly
 //! (innovations, load factor); a flight controller without a vane is left to its own checks.
 
+use super::ground_velocity::GroundVelocity;
 use super::lift::{ByLift, LiftCurve, SLOWEST_MPS};
 use greylag_link::vehicle::{Faults, Telemetry, VANE_SD};
 use greylag_physics::Time;
@@ -76,6 +77,9 @@ pub(super) struct AirDataCheck {
     alpha: Check,
     airspeed: Check,
     changes: Vec<Change>,
+    velocity: GroundVelocity,
+    /// The last airspeed for control, m/s.
+    last_airspeed: f64,
 }
 
 /// History of the check of one measurement.
@@ -113,10 +117,17 @@ impl AirDataCheck {
         if frame.incidence_sd[0] > VANE_SD[0] {
             return [self.by_lift.alpha(curve, frame, measured[0], measured[1]), measured[1]];
         }
-        let flow = flow(frame).filter(|_| !frame.faults.contains(Faults::SPECIFIC_FORCE));
-        let Some(flow) = flow else {
-            (self.alpha, self.airspeed) = (Check::default(), Check::default());
+        if frame.faults.contains(Faults::SPECIFIC_FORCE) {
+            *self =
+                AirDataCheck { changes: std::mem::take(&mut self.changes), ..Default::default() };
             return measured;
+        }
+        let Some(flow) = self.velocity.at(frame).and_then(|velocity| flow(frame, velocity)) else {
+            let alpha = self.reference.alpha(curve, frame, measured[0], self.last_airspeed);
+            return [
+                if self.alpha.refused { alpha } else { measured[0] },
+                if self.airspeed.refused { self.last_airspeed } else { measured[1] },
+            ];
         };
         // a refused measurement is no reference of the other
         let [alpha, airspeed] = [
@@ -144,6 +155,7 @@ impl AirDataCheck {
                 answer[k] = used[k];
             }
         }
+        self.last_airspeed = answer[1];
         answer
     }
 
@@ -153,9 +165,10 @@ impl AirDataCheck {
     }
 }
 
-/// Angle of attack (rad) and airspeed (m/s) from attitude, velocity and wind. `None` if one of them is missing or the airspeed is low.
-fn flow(frame: &Telemetry) -> Option<[f64; 2]> {
-    let [north, east, down] = [0, 1, 2].map(|i| frame.velocity[i] - frame.wind[i]);
+/// Angle of attack (rad) and airspeed (m/s) from attitude, `velocity` over ground (NED, m/s) and wind. `None` if one of them is
+/// missing or the airspeed is low.
+fn flow(frame: &Telemetry, velocity: [f64; 3]) -> Option<[f64; 2]> {
+    let [north, east, down] = [0, 1, 2].map(|i| velocity[i] - frame.wind[i]);
     let (sin, cos) = frame.yaw.sin_cos();
     let ahead = [cos * north + sin * east, cos * east - sin * north, down];
     let [u, v, w] = horizon_to_body(&frame.state, ahead);
@@ -227,6 +240,8 @@ mod tests {
                 self.k += 1;
                 let mut frame =
                     Telemetry { time: Time::from_micros(10_000 * self.k), ..self.frame };
+                // ten new velocities a second
+                frame.velocity[0] += 1e-9 * (self.k / 10) as f64;
                 change(&mut frame);
                 answer = self.check.for_control(Some(&self.curve), &frame);
             }
@@ -309,6 +324,24 @@ mod tests {
         };
         let found = level.fly(2.0, gust);
         assert!((found[0] - alpha - 0.175).abs() < 1e-9 && level.changes().is_empty());
+    }
+
+    /// A pull-up of 30°/s at a constant angle of attack. Its lift is more than the model's, and the old velocity says that the nose
+    /// is far above the path.
+    #[test]
+    fn an_old_velocity_is_no_reference() {
+        let mut level = Level::new();
+        let Level { frame: Telemetry { velocity, state, .. }, .. } = level;
+        for k in 0..200 {
+            let pitch = state.pitch + 0.0052 * k as f64;
+            level.fly(0.01, |frame| {
+                frame.velocity = velocity;
+                frame.state.pitch = pitch;
+                frame.specific_force =
+                    [9.81 * pitch.sin(), 0.0, -9.81 * pitch.cos() - 0.52 * state.airspeed];
+            });
+        }
+        assert!(level.changes().is_empty());
     }
 
     #[test]

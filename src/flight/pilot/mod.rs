@@ -16,6 +16,7 @@ mod decision;
 mod envelope;
 mod estimate;
 mod failsafe;
+mod ground_velocity;
 mod lift;
 mod limits;
 mod model_watch;
