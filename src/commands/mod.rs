@@ -61,6 +61,7 @@ mod replay;
 #[cfg(feature = "demo")]
 mod report;
 mod one_line;
+mod outputs;
 pub mod shipped;
 mod status;
 mod terminal;
