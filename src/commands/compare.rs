@@ -13,6 +13,7 @@ use crate::commands::distinct::distinct;
 use crate::commands::files;
 use crate::commands::given;
 use crate::commands::intake::{Intake, LogArguments};
+use crate::commands::outputs;
 use crate::commands::predictions;
 use crate::commands::status::IN_DOUBT;
 use crate::commands::terminal::{print_answer, print_summary, table};
@@ -81,9 +82,8 @@ pub struct Arguments {
 /// the report.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
-    for path in arguments.json.iter().chain(&arguments.report).chain(&arguments.predictions) {
-        files::writable(path, overwrite)?;
-    }
+    let written = [&arguments.json, &arguments.report, &arguments.predictions];
+    outputs::check(written.into_iter().flatten(), inputs(arguments), overwrite)?;
     let models =
         arguments.models.iter().map(|path| given::model(path)).collect::<Result<Vec<_>>>()?;
     let clock = match arguments.recorded_clock {
@@ -94,7 +94,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         }
     };
     distinct(&arguments.logs.paths, &[])?;
-    let Intake { flights, mut notes, mut in_doubt, .. } =
+    let Intake { flights, mut notes, mut in_doubt, used, .. } =
         arguments.logs.take_in(&models[0], clock)?;
     let bar = Bar::new();
     let (mut comparison, flights) = compared(arguments, &models, flights, &bar)?;
@@ -103,7 +103,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     in_doubt |= comparison.flights.len() < arguments.logs.paths.len();
     notes.append(&mut comparison.notes);
     comparison.notes = notes;
-    comparison.answer = answer(arguments, &models, &flights, &comparison)?;
+    let next = next(arguments, &arguments.logs.among(&used));
+    let traced = traced(arguments, &models, &flights, &comparison)?;
+    comparison.answer = traced.unwrap_or_else(|| comparison.answer.clone()).then(next);
     if !files::is_stdout(arguments.json.as_deref()) {
         print(&comparison);
     }
@@ -119,6 +121,12 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         files::write(path, &page(arguments, &comparison), overwrite)?;
     }
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
+}
+
+/// The files that the command reads.
+fn inputs(arguments: &Arguments) -> Vec<PathBuf> {
+    let models = arguments.models.iter().flat_map(|path| given::files(path));
+    models.chain(arguments.logs.files().cloned()).collect()
 }
 
 /// The comparison of `models` with `flights`, and the flights if they are needed after it.
@@ -180,21 +188,14 @@ fn traced(
     Ok(None)
 }
 
-/// The summary with the command to run next. For a model and its amendment it is the summary of `traced`.
-fn answer(
-    arguments: &Arguments,
-    models: &[GreyBox],
-    flights: &[Reconstruction],
-    comparison: &Comparison,
-) -> Result<Answer> {
-    let traced = traced(arguments, models, flights, comparison)?;
-    let answer = traced.unwrap_or_else(|| comparison.answer.clone());
+/// The command to run next. `used` are the logs that were compared.
+fn next(arguments: &Arguments, used: &LogArguments) -> String {
     let files = &arguments.models;
     let last = quoted(files.last().map_or(Path::new(""), PathBuf::as_path));
-    Ok(answer.then(match models.len() {
-        1 => format!("greylag diagnose --model {last}{}", arguments.logs.words()),
+    match files.len() {
+        1 => format!("greylag diagnose --model {last}{}", used.words()),
         _ => format!("greylag aircraft check --model {last}"),
-    }))
+    }
 }
 
 /// The report as HTML.

@@ -9,8 +9,9 @@ use comfy_table::{CellAlignment, Table};
 use serde::Serialize;
 
 use crate::commands::bar::Bar;
-use crate::commands::effect_files::named_effects;
+use crate::commands::effect_files::{effect_paths, named_effects};
 use crate::commands::files::{self, JsonArgument, shipped};
+use crate::commands::{given, outputs};
 use crate::control::{ControllerKind, build};
 use crate::model::GreyBox;
 use crate::sim::design::{ENOUGH, LONGEST_S, Plan, Prospect, Suspect, plan, prospects};
@@ -84,10 +85,9 @@ fn document<'a>(
 /// If the model, an effect or the file cannot be used, or no manoeuvre distinguishes the two effects.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
-    if let Some(path) = &arguments.out {
-        files::writable(path, overwrite)?;
-    }
-    arguments.json.writable(overwrite)?;
+    let written = arguments.out.iter().chain(arguments.json.path());
+    let inputs = [given::files(&arguments.model), effect_paths(&arguments.between)].concat();
+    outputs::check(written, inputs, overwrite)?;
     let model = GreyBox::load(&shipped(&arguments.model))?;
     let suspects = suspects(arguments)?;
     let lqi = build(ControllerKind::Lqi, &model)?;

@@ -12,10 +12,11 @@ use serde::Serialize;
 
 use crate::commands::bar::{Bar, shares};
 use crate::commands::distinct::distinct;
-use crate::commands::effect_files::{file_words, named_effects};
+use crate::commands::effect_files::{effect_paths, file_words, named_effects};
 use crate::commands::files;
 use crate::commands::given;
 use crate::commands::intake::{Intake, LogArguments};
+use crate::commands::outputs;
 use crate::commands::per_flight::PerFlightArguments;
 use crate::commands::status::IN_DOUBT;
 use crate::commands::terminal::{self, NORMAL_95, print_answer, print_summary};
@@ -82,12 +83,10 @@ const AS_RECORDED: &str = "The errors of free runs are computed with the actuato
 /// Reads the logs, reconstructs the flights and diagnoses the model. Prints sentences and tables, and writes JSON and report.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
-    for path in arguments.json.iter().chain(&arguments.report) {
-        files::writable(path, overwrite)?;
-    }
+    outputs::check(arguments.json.iter().chain(&arguments.report), inputs(arguments), overwrite)?;
     distinct(&arguments.logs.paths, &[])?;
     let model = given::model(&arguments.model)?;
-    let Intake { flights, mut notes, in_doubt, .. } =
+    let Intake { flights, mut notes, in_doubt, used, .. } =
         arguments.logs.take_in(&model, ActuatorClock::AsRecorded)?;
     let options = Options {
         seed: arguments.seed,
@@ -110,7 +109,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let flights = clocked(flights, &model, &mut diagnosis);
     let Diagnosed { tuned, answer } = diagnosed(&model, &flights, &diagnosis)?;
     let words = file_words(&arguments.effects)?;
-    let next = next::next(arguments, &model, &diagnosis, &words, &answer);
+    let logs = arguments.logs.among(&used);
+    let next = next::next((arguments, &logs), &model, &diagnosis, &words, &answer);
     let answer = answer.then(next);
     // the page is drawn before anything is written, so that Ctrl-C leaves no file behind
     let drawn = arguments.report.as_ref().map(|path| {
@@ -139,6 +139,16 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         print_summary(&answer);
     }
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
+}
+
+/// The files that the command reads.
+fn inputs(arguments: &Arguments) -> Vec<PathBuf> {
+    let logs = arguments.logs.files().cloned();
+    given::files(&arguments.model)
+        .into_iter()
+        .chain(logs)
+        .chain(effect_paths(&arguments.effects))
+        .collect()
 }
 
 /// The flights of `diagnosis`, which used the recorded deflections, on the time base on which `compare` computes free runs. If a

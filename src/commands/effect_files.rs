@@ -70,6 +70,17 @@ fn folder_files(named: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
+/// Paths of the effect files that `effects` names, alone or by their folder. A folder that cannot be read is left to
+/// [`named_effects`].
+pub fn effect_paths(effects: &[String]) -> Vec<PathBuf> {
+    let of = |named: &String| match shipped(Path::new(named)) {
+        folder if folder.is_dir() => folder_files(&folder, &folder).unwrap_or_default(),
+        file if is_file(named) => vec![file],
+        _ => Vec::new(),
+    };
+    effects.iter().flat_map(of).collect()
+}
+
 /// Whether `named` is a path and not an id. Only a path contains a dot or a slash.
 pub fn is_file(named: &str) -> bool {
     named.contains(['.', '/', '\\'])

@@ -7,8 +7,9 @@ use anyhow::{Context, Result, bail};
 use comfy_table::Table;
 use serde::Serialize;
 
-use crate::commands::effect_files::is_file;
+use crate::commands::effect_files::{effect_paths, is_file};
 use crate::commands::files::{self, JsonArgument, Overwrite, shipped};
+use crate::commands::{given, outputs};
 use crate::model::GreyBox;
 use crate::physics::Channel;
 use crate::physics::catalogue::on_air;
@@ -249,10 +250,9 @@ fn show(show: &Show) -> Result<()> {
     let overwrite = show.force.into();
     // Both outputs are checked before either is written. Otherwise the JSON file could be written and the page refused, and a
     // second attempt would be refused because the JSON file exists.
-    show.json.writable(overwrite)?;
-    if let Some(path) = &show.report {
-        files::writable(path, overwrite)?;
-    }
+    let written = show.json.path().into_iter().chain(&show.report);
+    let own = effect_paths(std::slice::from_ref(&show.id));
+    outputs::check(written, [given::files(&show.model), own].concat(), overwrite)?;
     let listed = Listed { effects: vec![Document::new(place, &about)] };
     show.json.write(SCHEMA, &listed, overwrite)?;
     let channels = channels(place, &about);

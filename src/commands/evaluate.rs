@@ -21,7 +21,7 @@ use serde::Serialize;
 use crate::commands::files::{self, shipped};
 use crate::commands::start::{self, StartArguments};
 use crate::commands::terminal::print_next;
-use crate::commands::{bar, choices, controllers, fly};
+use crate::commands::{bar, choices, controllers, fly, given, outputs};
 use crate::control::cem::Change;
 use crate::control::envelope::Guarded;
 use crate::control::quality::Limits;
@@ -164,9 +164,9 @@ struct Document<'a> {
 /// Flies and scores the controllers, prints the tables, and writes JSON and page.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
-    for path in arguments.json.iter().chain(&arguments.report) {
-        files::writable(path, overwrite)?;
-    }
+    let models = arguments.models.iter().chain(&arguments.of_any.beside);
+    let inputs = models.flat_map(|path| given::files(path)).chain([arguments.targets.clone()]);
+    outputs::check(arguments.json.iter().chain(&arguments.report), inputs, overwrite)?;
     controllers::check_changes(&arguments.controllers, &arguments.changes)?;
     if let Some(count) = arguments.any {
         return any::fly(arguments, count);

@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use serde::Serialize;
 
 pub use super::shipped::shipped;
@@ -28,9 +28,9 @@ impl From<bool> for Overwrite {
     }
 }
 
-/// Whether a path denotes standard output: `-`.
+/// Whether a path denotes standard output: `-` or `/dev/stdout`.
 pub fn is_stdout(path: Option<&Path>) -> bool {
-    path == Some(Path::new("-"))
+    path.is_some_and(|path| [Path::new("-"), Path::new("/dev/stdout")].contains(&path))
 }
 
 /// The option `--json` of a command.
@@ -51,6 +51,11 @@ struct Document<'a, T> {
 }
 
 impl JsonArgument {
+    /// The path that was given.
+    pub fn path(&self) -> Option<&PathBuf> {
+        self.json.as_ref()
+    }
+
     /// Fails if the JSON file cannot be written, see `writable`.
     pub fn writable(&self, overwrite: Overwrite) -> Result<()> {
         self.json.as_ref().map_or(Ok(()), |path| writable(path, overwrite))
@@ -85,7 +90,8 @@ pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
         Overwrite::Never => Some("name another file, or give --force to replace it"),
         Overwrite::Force => None,
     };
-    if let Some(remedy) = remedy.filter(|_| path.exists()) {
+    // a symbolic link exists even if its target does not
+    if let Some(remedy) = remedy.filter(|_| path.symlink_metadata().is_ok()) {
         bail!("{} exists; {remedy}", path.display());
     }
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -95,15 +101,15 @@ pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
     Ok(())
 }
 
-/// Writes `content` to a temporary file that then becomes `path`, so that no incomplete file remains. The path `-` is
-/// standard output.
+/// Writes `content` to a temporary file that then becomes `path`, so that no incomplete file remains. The paths `-` and
+/// `/dev/stdout` are standard output. Other devices and named pipes are opened and receive the content.
 pub fn write(path: &Path, content: &str, overwrite: Overwrite) -> Result<()> {
     writable(path, overwrite)?;
     if is_stdout(Some(path)) {
         return match std::io::stdout().write_all(content.as_bytes()) {
             // the reader has closed the pipe, as in `greylag … | head`
             Err(error) if error.kind() == ErrorKind::BrokenPipe => std::process::exit(0),
-            written => Ok(written?),
+            written => written.context("cannot write to standard output"),
         };
     }
     match overwrite {

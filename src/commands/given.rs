@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 
@@ -26,6 +26,18 @@ pub fn model(path: &Path) -> Result<GreyBox> {
         );
     }
     Ok(GreyBox::load(&found)?)
+}
+
+/// The model file at `path`, and the airframe and the learned residual that it names.
+pub fn files(path: &Path) -> Vec<PathBuf> {
+    let path = shipped(path);
+    // a log given as a model can be large
+    let text = if is_log(&path) { None } else { std::fs::read_to_string(&path).ok() };
+    let table: toml::Table = text.and_then(|text| toml::from_str(&text).ok()).unwrap_or_default();
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let named = ["airframe", "residual"].into_iter().filter_map(|key| table.get(key)?.as_str());
+    let named: Vec<PathBuf> = named.map(|name| folder.join(name)).collect();
+    [vec![path], named].concat()
 }
 
 /// Refuses a `.toml` file that is given in place of a log.

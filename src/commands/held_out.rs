@@ -37,5 +37,6 @@ pub fn validation(
     let more = logs.of(held).take_in_as(model, clock, &taken.installation)?;
     taken.notes.extend(more.notes);
     taken.in_doubt |= more.in_doubt;
+    taken.used.extend(more.used);
     Ok(more.flights)
 }

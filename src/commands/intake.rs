@@ -58,6 +58,8 @@ pub struct Intake {
     pub notes: Vec<String>,
     /// Whether a log was left out, or has a finding that makes the results wrong.
     pub in_doubt: bool,
+    /// Files of the flights, in the order of the command line.
+    pub used: Vec<PathBuf>,
     /// Priors of the constants of the installation for further flights of the aircraft, such as those held out.
     pub installation: Vec<Prior>,
 }
@@ -130,6 +132,17 @@ impl LogArguments {
     #[cfg(feature = "study")]
     pub fn of(&self, paths: Vec<PathBuf>) -> LogArguments {
         LogArguments { paths, ..self.clone() }
+    }
+
+    /// Those of the logs that are in `used`, with the same reading options.
+    pub fn among(&self, used: &[PathBuf]) -> LogArguments {
+        let paths = self.paths.iter().filter(|path| used.contains(path)).cloned().collect();
+        LogArguments { paths, ..self.clone() }
+    }
+
+    /// All files that the options name: the logs and the mapping.
+    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.paths.iter().chain(&self.reading.mapping)
     }
 
     /// The logs and the reading options as words of a command line, with a leading space.
@@ -269,6 +282,8 @@ impl Reading {
             bail!("no log can be compared: what is wrong with each is said above");
         }
         intake.share_installation(&places, &reading, setting)?;
+        intake.used = places.iter().map(|(path, _)| path.to_path_buf()).collect();
+        intake.used.dedup();
         Ok(intake)
     }
 

@@ -10,6 +10,7 @@ use crate::commands::files;
 use crate::commands::mapping_file::mapping;
 use crate::commands::mistake;
 use crate::commands::status::IN_DOUBT;
+use crate::commands::{given, outputs};
 use crate::logs::finding::Severity;
 use crate::logs::info::Info;
 use crate::logs::mapping::Mapping;
@@ -116,6 +117,13 @@ impl Reading {
         let (flies, sources) = (mapping.flies(flies), self.source.clone());
         Ok(Options { tolerance, mapping, flies, sources })
     }
+
+    /// All files that are read with the log `input`: itself, the mapping, the airframe and the files of `model`.
+    fn files(&self, input: &Path, model: Option<&PathBuf>) -> Vec<PathBuf> {
+        let model = model.map_or_else(Vec::new, |path| given::files(path));
+        let named = self.mapping.iter().chain(&self.airframe).cloned();
+        model.into_iter().chain(named).chain([input.to_owned()]).collect()
+    }
 }
 
 /// Runs the chosen subcommand.
@@ -143,14 +151,14 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             Ok(status(if broken { Some(Severity::Problem) } else { worst }))
         }
         Verb::Convert { input, output, model, force, reading } => {
-            files::writable(output, (*force).into())?;
+            outputs::check([output], reading.files(input, model.as_ref()), (*force).into())?;
             let model =
                 model.as_deref().map(|path| GreyBox::load(&files::shipped(path))).transpose()?;
             let log = crate::logs::load(input, &reading.options(model.as_ref())?)?;
             convert(&log, output, *force)
         }
         Verb::Reconstruct { input, output, model, force, reading } => {
-            files::writable(output, (*force).into())?;
+            outputs::check([output], reading.files(input, Some(model)), (*force).into())?;
             let model = GreyBox::load(&files::shipped(model))?;
             let log = crate::logs::load(input, &reading.options(Some(&model))?)?;
             let options =

@@ -23,6 +23,14 @@ pub fn text(error: &anyhow::Error) -> String {
     }
 }
 
+/// Text of the operating system's error `cause`, for which standard output cannot be written.
+pub fn no_output(cause: &str) -> String {
+    let full = ["No space left", "quota"].iter().any(|word| cause.contains(word));
+    let room = if full { "make room there or " } else { "" };
+    let cause = without_numbers(cause.to_owned());
+    format!("cannot write to standard output: {cause}; {room}send it elsewhere")
+}
+
 /// Remedy for an operating-system error of this kind; `None` if there is none.
 fn cure(kind: ErrorKind) -> Option<&'static str> {
     match kind {
@@ -62,6 +70,18 @@ fn plain(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_output_that_cannot_be_written_has_a_cure() {
+        assert_eq!(
+            no_output("No space left on device (os error 28)"),
+            "cannot write to standard output: No space left on device; make room there or send it elsewhere"
+        );
+        assert_eq!(
+            no_output("Input/output error (os error 5)"),
+            "cannot write to standard output: Input/output error; send it elsewhere"
+        );
+    }
 
     #[test]
     fn the_cure_is_the_systems_and_no_temporary_name_is_shown() {

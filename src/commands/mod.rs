@@ -61,6 +61,7 @@ mod replay;
 #[cfg(feature = "demo")]
 mod report;
 mod one_line;
+mod outputs;
 pub mod shipped;
 mod status;
 mod terminal;
@@ -190,15 +191,20 @@ enum Command {
     Workbench(workbench::Arguments),
 }
 
-/// Ends the program silently when its output pipe is closed, as in `greylag … | head`.
-fn end_with_the_reader() {
+/// Ends the program if a text cannot be printed: silently if the output pipe is closed, as in `greylag … | head`, otherwise
+/// with one line on standard error and status 1. `println!` panics in both cases.
+fn end_with_the_output() {
     let usual = panic::take_hook();
     panic::set_hook(Box::new(move |about| {
         let text = about.payload_as_str().unwrap_or_default();
-        if text.starts_with("failed printing to stdout") && text.contains("Broken pipe") {
+        let Some(cause) = text.strip_prefix("failed printing to stdout: ") else {
+            return usual(about);
+        };
+        if cause.contains("Broken pipe") {
             process::exit(0);
         }
-        usual(about);
+        terminal::complain(format_args!("{}", mistake::no_output(cause)));
+        process::exit(1);
     }));
 }
 
@@ -239,7 +245,7 @@ pub fn main() -> ExitCode {
     tracing_subscriber::registry().with(filter).with(lines).init();
     // a flight must continue when the program that reads its output ends
     if !matches!(command, Command::Fly(_)) {
-        end_with_the_reader();
+        end_with_the_output();
     }
     run(command).unwrap_or_else(|error| {
         if error.chain().any(|cause| cause.is::<Cancelled>()) {

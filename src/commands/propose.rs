@@ -9,10 +9,11 @@ use comfy_table::{CellAlignment, Table};
 
 use crate::commands::bar::Bar;
 use crate::commands::distinct::distinct;
-use crate::commands::effect_files::named_effects;
+use crate::commands::effect_files::{effect_paths, named_effects};
 use crate::commands::files;
 use crate::commands::given;
 use crate::commands::intake::{Intake, LogArguments};
+use crate::commands::outputs;
 use crate::commands::status::IN_DOUBT;
 use crate::sysid::diagnose::{Options, Proposal, Rung, propose};
 use crate::sysid::flight_path::ActuatorClock;
@@ -63,14 +64,12 @@ pub struct Arguments {
 /// If a file cannot be read or written, or the flights do not allow a search.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
-    for path in arguments.json.iter().chain(&arguments.out) {
-        files::writable(path, overwrite)?;
-    }
+    outputs::check(arguments.json.iter().chain(&arguments.out), inputs(arguments), overwrite)?;
     let model = given::model(&arguments.model)?;
     let with = named_effects(&arguments.effects)?;
     let (search, test) = divided(arguments)?;
     let clock = ActuatorClock::AsRecorded;
-    let Intake { flights, mut notes, mut in_doubt, installation } =
+    let Intake { flights, mut notes, mut in_doubt, installation, .. } =
         arguments.logs.of(search).take_in(&model, clock)?;
     let tests = arguments.logs.of(test).take_in_as(&model, clock, &installation)?;
     in_doubt |= tests.in_doubt;
@@ -109,9 +108,18 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
+/// The files that the command reads.
+fn inputs(arguments: &Arguments) -> Vec<PathBuf> {
+    let logs = arguments.logs.files().chain(&arguments.hold_out).cloned();
+    given::files(&arguments.model)
+        .into_iter()
+        .chain(logs)
+        .chain(effect_paths(&arguments.effects))
+        .collect()
+}
+
 /// Divides the logs into logs for the search and logs for the test. If no log is held out by `--hold-out`, the last log is for
 /// the test.
-/// for the test.
 fn divided(arguments: &Arguments) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
     let (logs, held) = (&arguments.logs.paths, &arguments.hold_out);
     distinct(logs, held)?;

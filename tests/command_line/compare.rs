@@ -109,6 +109,46 @@ fn what_is_missing_is_asked_for() {
     assert!(text(&output.stderr).contains("no flight"), "{}", text(&output.stderr));
 }
 
+/// Without `--force` a file of an earlier run is in the way; with it too, no input is replaced and no output lost.
+#[test]
+fn no_output_replaces_an_input_or_another_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (a, model) = (log(folder.path(), "a.csv", 1, 15.0), at("model.toml"));
+    fs::copy("params/x8/prior.toml", &model).unwrap();
+    fs::copy("params/x8/airframe.toml", at("airframe.toml")).unwrap();
+    let before = [&a, &model, &at("airframe.toml")].map(|path| fs::read(path).unwrap());
+    let (both, page) = (at("both"), at("page.html"));
+    for (more, said) in [
+        (["--report", &a, "--json", &page], "is an input"),
+        (["--report", &page, "--json", &model], "is an input"),
+        (["--report", &at("./a.csv"), "--json", &page], "is an input"),
+        (["--report", &page, "--predictions", &at("airframe.toml")], "is an input"),
+        (["--report", &both, "--json", &both], "two outputs"),
+    ] {
+        let output = greylag(&[&["--model", &model, "--log", &a, "--force"][..], &more].concat());
+        let error = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{more:?}: {error}");
+        // nothing was computed before
+        assert!(error.lines().count() == 1 && error.contains(said), "{more:?}: {error}");
+    }
+    let after = [&a, &model, &at("airframe.toml")].map(|path| fs::read(path).unwrap());
+    assert!(before == after && fs::read_dir(folder.path()).unwrap().count() == 3);
+}
+
+#[test]
+fn the_next_command_names_the_logs_that_were_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = log(folder.path(), "good.csv", 3, 15.0);
+    let bad = folder.path().join("bad.csv");
+    fs::write(&bad, "time_s,roll_rad\n0,0\n").unwrap();
+    let line = ["--model", "params/x8/prior.toml", "--log", &good, bad.to_str().unwrap()];
+    let said = text(&greylag(&line).stdout);
+    let next = said.lines().next_back().unwrap();
+    assert!(next.starts_with("next: ") && next.contains(&good), "{said}");
+    assert!(!next.contains("bad.csv"), "{said}");
+}
+
 #[test]
 fn quiet_leaves_results_alone() {
     let folder = tempfile::tempdir().unwrap();

@@ -353,6 +353,49 @@ fn a_reader_that_leaves_is_no_fault() {
     }
 }
 
+/// `/dev/full` refuses what is written to it, as a full disk does.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_behind_standard_output_is_said_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.csv");
+    csv::save(&fly(1, 15.0, REALISTIC), &path).unwrap();
+    let log = path.to_str().unwrap();
+    for arguments in [
+        &["effects", "list"][..],
+        &["effects", "show", "drag_beta2"],
+        &["completions", "bash"],
+        &["aircraft", "check", "--model", "params/x8/jsbsim.toml"],
+        &["logs", "info", log],
+        &["logs", "info", log, "--json"],
+        &["effects", "list", "--json", "-"],
+    ] {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_greylag"))
+            .args(arguments)
+            .stdout(full)
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {said}");
+        let cause =
+            "greylag: cannot write to standard output: No space left on device; make room there";
+        assert!(said.starts_with(cause) && said.lines().count() == 1, "{arguments:?}: {said}");
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn a_symbolic_link_as_an_output_stays_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let [target, link] = ["found.json", "link.json"].map(|name| folder.path().join(name));
+    fs::write(&target, "of an earlier run").unwrap();
+    std::os::unix::fs::symlink("found.json", &link).unwrap();
+    let line = ["effects", "show", "drag_beta2", "--force", "--json", link.to_str().unwrap()];
+    assert!(greylag(&line).status.success());
+    assert!(link.is_symlink() && fs::read_to_string(&target).unwrap().contains("drag_beta2"));
+}
+
 /// Each of the long tasks has its own error around the cancellation, and each must be recognised.
 #[test]
 #[cfg(unix)]

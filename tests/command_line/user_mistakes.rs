@@ -71,7 +71,7 @@ const FILES: [Mistake; 22] = [
     ),
 ];
 
-const KEPT: [Mistake; 10] = [
+const KEPT: [Mistake; 17] = [
     (
         "compare --model @/model.toml --log @/good.csv --json @/there.json",
         1,
@@ -100,6 +100,37 @@ const KEPT: [Mistake; 10] = [
         &["held out", "one place"],
     ),
     ("logs convert @/good.csv @/there.json", 1, &["there.json", "--force"]),
+    ("logs convert @/good.csv @/good.csv --force", 1, &["good.csv is an input"]),
+    (
+        "logs reconstruct @/good.csv @/airframe.toml --model @/model.toml --force",
+        1,
+        &["airframe.toml is an input"],
+    ),
+    (
+        "diagnose --model @/model.toml --log @/good.csv --json @/model.toml --force",
+        1,
+        &["model.toml is an input"],
+    ),
+    (
+        "propose --model @/model.toml --log @/good.csv @/other.csv --out @/x.toml --json @/x.toml",
+        1,
+        &["two outputs"],
+    ),
+    (
+        "amend --model @/model.toml --log @/good.csv --tune-only --out @ --force",
+        1,
+        &["model.toml is an input", "another folder"],
+    ),
+    (
+        "amend --model @/model.toml --log @/good.csv --tune-only --out @/new --report @/new/model.toml",
+        1,
+        &["two outputs"],
+    ),
+    (
+        "evaluate --controller lqi --model @/model.toml --report @/model.toml --force",
+        1,
+        &["model.toml is an input"],
+    ),
     ("aircraft new @ --mass-kg 2.1 --span-m 1.6 --area-m2 0.3", 1, &["exists"]),
     ("mystery --seed 3 --out @", 1, &["exists", "another folder"]),
 ];

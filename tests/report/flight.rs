@@ -301,6 +301,36 @@ fn a_file_is_never_overwritten_unasked() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
+#[cfg(unix)]
+#[test]
+fn a_link_stays_and_its_target_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let [target, link] = ["target.html", "link.html"].map(|name| folder.path().join(name));
+    std::os::unix::fs::symlink("target.html", &link).unwrap();
+    // at first the target does not exist
+    for text in ["made", "replaced"] {
+        write_over(&link, text).unwrap();
+        assert!(link.is_symlink() && !target.is_symlink());
+        assert_eq!(std::fs::read_to_string(&target).unwrap(), text);
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_named_pipe_is_written_and_stays() {
+    use std::os::unix::fs::FileTypeExt;
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let reader = pipe.clone();
+    let reader = std::thread::spawn(move || std::fs::read_to_string(reader).unwrap());
+    write_over(&pipe, "text").unwrap();
+    // checked before the reader is waited for: it never ends if the pipe was replaced
+    assert!(std::fs::metadata(&pipe).unwrap().file_type().is_fifo());
+    assert_eq!(reader.join().unwrap(), "text");
+}
+
 #[test]
 fn an_empty_page_is_a_page() {
     assert_well_formed(&Page::default().render());

@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use crate::commands::files::{self, JsonArgument, Overwrite, shipped};
 use crate::commands::given;
+use crate::commands::outputs;
 use crate::commands::status::IN_DOUBT;
 use crate::commands::terminal::print_next;
 use crate::control::aircraft_check::{self, AircraftCheck};
@@ -44,10 +45,8 @@ struct Document<'a> {
 
 /// Checks the aircraft and prints the results. The exit status is 3 if something should be corrected before a flight.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
-    arguments.json.writable(Overwrite::New)?;
-    if let Some(path) = &arguments.report {
-        files::writable(path, Overwrite::New)?;
-    }
+    let written = arguments.json.path().into_iter().chain(&arguments.report);
+    outputs::check(written, given::files(&arguments.model), Overwrite::New)?;
     let model = given::model(&arguments.model)?;
     let found = aircraft_check::check(&model)?;
     if !arguments.json.takes_stdout() {

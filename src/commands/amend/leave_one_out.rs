@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use comfy_table::{CellAlignment, Table};
 
+use super::places::Made;
 use crate::commands::bar::Bar;
 use crate::commands::files::{self, Overwrite};
 use crate::model::GreyBox;
@@ -67,7 +68,7 @@ pub fn structures(model: &GreyBox, effects: &[Added], asked: PerFlight) -> Vec<S
 }
 
 /// Cross-validates `structures` of `model` on `flights` and prints a table of their errors. Writes the table as JSON to the
-/// file `json` if one is given.
+/// file `json` if one is given, and makes its folder.
 pub fn run(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -117,6 +118,7 @@ pub fn run(
         );
     }
     if let Some(path) = json {
+        let _made = path.parent().map(Made::folder).transpose()?;
         files::write(path, &(serde_json::to_string_pretty(&scored)? + "\n"), overwrite)?;
     }
     Ok(ExitCode::SUCCESS)

@@ -12,18 +12,19 @@ mod unasserted;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 
-use places::{Places, hashed};
+use places::{Made, Places, hashed};
 use tables::print;
 
 use crate::commands::bar::{Bar, shares};
 use crate::commands::distinct::{distinct, distinct_names};
-use crate::commands::effect_files::{named_effects, own_effects};
+use crate::commands::effect_files::{effect_paths, named_effects, own_effects};
 use crate::commands::files::{self, shipped};
 use crate::commands::given as read;
 use crate::commands::held_out;
 use crate::commands::intake::{Intake, LogArguments};
+use crate::commands::outputs;
 use crate::commands::per_flight::FitConstantsArguments;
 use crate::commands::status::IN_DOUBT;
 use crate::commands::terminal::print_summary;
@@ -31,18 +32,22 @@ use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::physics::catalogue;
 use crate::report::AmendmentReport;
+use crate::sysid::amend::document::{MODEL, STORY};
 use crate::sysid::amend::{self, Added, Amended, Amendment, Prior, Refused};
-use crate::sysid::compare::{self, compare};
+use crate::sysid::compare::{self, Answer, compare};
 use crate::sysid::diagnose::{self, diagnose};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::progress::{Progress, Stage, part};
 
+/// File name of the errors that `--leave-one-out` finds.
+const LEAVE_ONE_OUT: &str = "leave-one-out.json";
+
 /// Options of `greylag amend`.
 #[derive(clap::Args)]
 #[command(
     group = clap::ArgGroup::new("what").required(true).multiple(true),
-    after_help = "Exit status: 0 done, 1 nothing was written, 3 not written, for the fit predicts the flights held out worse than the model as given or not better with 95 % confidence, or written, but an effect was refused, a coefficient ended at a bound, a log was left out or flights contradict one another."
+    after_help = "Exit status: 0 written; 1 an error, or every effect was refused: nothing was written; 3 not written, for the fit predicts the flights held out worse than the model as given or not better with 95 % confidence, or written, but an effect was refused, a coefficient ended at a bound, a log was left out or flights contradict one another."
 )]
 pub struct Arguments {
     /// Model file to start from; it stays as it is.
@@ -114,9 +119,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if arguments.leave_one_out {
         return structures(arguments, &model);
     }
-    if let Some(path) = &arguments.report {
-        files::writable(path, overwrite)?;
-    }
+    arguments.check_outputs(&[MODEL, STORY])?;
     let places = Places::new(&path, &model, &arguments.out, overwrite)?;
     arguments.check_logs()?;
     let effects = named_effects(&arguments.effects)?;
@@ -125,7 +128,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let (logs, hold_out) = (hashed(&paths)?, hashed(&held)?);
     let mut taken = arguments.logs.of(paths).take_in(&model, ActuatorClock::AsRecorded)?;
     let tests = tests(arguments, held, &model, &mut taken)?;
-    let Intake { flights, notes, mut in_doubt, .. } = taken;
+    let Intake { flights, notes, mut in_doubt, used, .. } = taken;
     let options = options(arguments, wanted(arguments, &effects, &model, &flights)?);
     let bar = Bar::new();
     let on_stage = |stage: Stage<'_>| bar.update(stage);
@@ -136,15 +139,16 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     in_doubt |= doubtful(story);
     let all_refused = story.all_refused();
     let kept = given_is_kept(arguments, story).filter(|_| !all_refused);
+    let answer = amended.amendment.answer.clone().then(next(&arguments.logs.among(&used), &places));
     // the page is drawn before any file is written, so that Ctrl-C during the drawing leaves no file behind
-    let draw = || page(arguments, &model, &amended, &tests, &places, &part(&on_stage, drawing));
+    let told = (&places, &answer);
+    let draw = || page(arguments, &model, &amended, &tests, told, &part(&on_stage, drawing));
     let drawn = match &arguments.report {
         Some(path) if !all_refused && kept.is_none() => Some((path, draw()?)),
         _ => None,
     };
     bar.go_on()?;
     drop(bar);
-    let answer = amended.amendment.answer.clone().then(next(arguments, &places));
     if let Some(why) = &kept {
         println!("{why} Nothing was written; --accept-anyway writes the fit.\n");
     }
@@ -167,6 +171,18 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 impl Arguments {
+    /// Checks the page and the files `names` in the folder for the results, see [`outputs::check`]. Whether the files in the
+    /// folder can be written is checked when the folder exists.
+    fn check_outputs(&self, names: &[&str]) -> Result<()> {
+        let logs = self.logs.files().chain(&self.hold_out).chain(&self.diagnosis).cloned();
+        let mut inputs = read::files(&self.model);
+        inputs.extend(logs.chain(effect_paths(&self.effects)));
+        let results = names.iter().map(|name| self.out.join(name));
+        let all: Vec<PathBuf> = results.chain(self.report.clone()).collect();
+        outputs::separate(&all, &inputs)?;
+        self.report.iter().try_for_each(|path| files::writable(path, self.force.into()))
+    }
+
     /// Checks that no log is named twice and, if constants are estimated per flight, that all file names differ.
     fn check_logs(&self) -> Result<()> {
         distinct(&self.logs.paths, &self.hold_out)?;
@@ -186,9 +202,8 @@ fn given_is_kept(arguments: &Arguments, story: &Amendment) -> Option<String> {
     story.worse().or_else(by_chance).or_else(unjudged).filter(|_| !arguments.accept_anyway)
 }
 
-/// The command to run next: a diagnosis of the amended model.
-fn next(arguments: &Arguments, places: &Places) -> String {
-    let logs = &arguments.logs;
+/// The command to run next: a diagnosis of the amended model with `logs`, those that were used.
+fn next(logs: &LogArguments, places: &Places) -> String {
     format!("greylag diagnose --model {}{}", quoted(&places.model()), logs.words())
 }
 
@@ -216,10 +231,11 @@ fn structures(arguments: &Arguments, model: &GreyBox) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
     // with a log given twice, the fit would see a copy of the flight that is left out
     distinct(&arguments.logs.paths, &[])?;
-    std::fs::create_dir_all(&arguments.out)
-        .with_context(|| format!("cannot make the folder {}", arguments.out.display()))?;
-    let json = arguments.out.join("leave-one-out.json");
+    arguments.check_outputs(&[LEAVE_ONE_OUT])?;
+    let json = arguments.out.join(LEAVE_ONE_OUT);
+    let made = Made::folder(&arguments.out)?;
     files::writable(&json, overwrite)?;
+    drop(made);
     let effects = named_effects(&arguments.effects)?;
     check_new(&effects, model)?;
     let taken = arguments.logs.take_in(model, ActuatorClock::AsRecorded)?;
@@ -270,18 +286,17 @@ fn page(
     model: &GreyBox,
     amended: &Amended,
     tests: &[Reconstruction],
-    places: &Places,
+    (places, answer): (&Places, &Answer),
     progress: &Progress,
 ) -> Result<String> {
     let mut models = [model.clone(), amended.tuned.clone(), amended.model.clone()];
     models[1].name = format!("{}-tuned", model.name);
     let held_out = compare(&models, tests, &compare::Options::default(), progress)?;
     let paths = arguments.logs.paths.iter().chain(&arguments.hold_out);
-    let answer = amended.amendment.answer.clone().then(next(arguments, places));
     let report = AmendmentReport {
         title: format!("{} amended", model.name),
         amendment: &amended.amendment,
-        answer: Some(&answer),
+        answer: Some(answer),
         held_out: Some(&held_out),
         model_files: vec![
             arguments.model.display().to_string(),

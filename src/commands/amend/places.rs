@@ -22,27 +22,44 @@ pub fn hashed(paths: &[PathBuf]) -> Result<Vec<Hashed>> {
     paths.iter().map(one).collect()
 }
 
-/// The files of the original model, and the folder for the results.
-pub struct Places {
-    original: Original,
-    folder: PathBuf,
-    /// Whether this run made the folder.
-    made: bool,
+/// Folders that this run has made, the deepest first. Those that are empty when this value is dropped are removed.
+pub struct Made(Vec<PathBuf>);
+
+impl Made {
+    /// Makes `folder` and the folders above it, as far as they do not exist.
+    ///
+    /// # Errors
+    /// If a folder cannot be made.
+    pub fn folder(folder: &Path) -> Result<Made> {
+        let missing = folder.ancestors().take_while(|path| !path.exists());
+        let missing = missing.filter(|path| !path.as_os_str().is_empty());
+        let made = Made(missing.map(Path::to_owned).collect());
+        fs::create_dir_all(folder).with_context(|| {
+            format!("cannot make the folder {}; name another one", folder.display())
+        })?;
+        Ok(made)
+    }
 }
 
-impl Drop for Places {
-    /// Removes the folder if this run made it and it is empty.
+impl Drop for Made {
     fn drop(&mut self) {
-        if self.made {
+        for folder in &self.0 {
             // `remove_dir` does not remove a folder with files
-            let _ = fs::remove_dir(&self.folder);
+            let _ = fs::remove_dir(folder);
         }
     }
 }
 
+/// The files of the original model, and the folder for the results.
+pub struct Places {
+    original: Original,
+    folder: PathBuf,
+}
+
 impl Places {
-    /// Reads the file `original`, from which `model` was loaded, and makes `folder`. It fails now, before the fit, if the
-    /// results could not be written after the fit.
+    /// Reads the file `original`, from which `model` was loaded. It fails now, before the fit, if the results could not be
+    /// written into `folder` after the fit. A folder that does not exist is made and removed again: an end of the program
+    /// during the fit leaves no empty folder.
     pub fn new(
         original: &Path,
         model: &GreyBox,
@@ -57,15 +74,8 @@ impl Places {
                 model.name
             );
         }
-        let (read, made) = (Original::read(original)?, !folder.exists());
-        fs::create_dir_all(folder).with_context(|| {
-            format!("cannot make the folder {}; name another one", folder.display())
-        })?;
-        let places = Places { original: read, folder: folder.into(), made };
-        let original = fs::canonicalize(original)?;
-        if fs::canonicalize(places.model()).is_ok_and(|p| p == original) {
-            bail!("{} is the model to start from; name another folder", places.model().display());
-        }
+        let places = Places { original: Original::read(original)?, folder: folder.into() };
+        let _made = Made::folder(folder)?;
         files::writable(&places.model(), overwrite)?;
         files::writable(&folder.join(STORY), overwrite)?;
         let airframe = folder.join(&places.original.airframe);
@@ -89,6 +99,7 @@ impl Places {
         logs: [&[Hashed]; 2],
         overwrite: Overwrite,
     ) -> Result<()> {
+        let _made = Made::folder(&self.folder)?;
         for (name, text) in document::files(&self.original, before, amended, logs)? {
             let path = self.folder.join(name);
             // the files of airframe and effects may exist already if an amended model is amended again
@@ -114,6 +125,19 @@ fn holds(path: &Path, text: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn folders_that_stay_empty_are_removed() {
+        let scratch = tempfile::tempdir().unwrap();
+        let above = scratch.path().join("above");
+        let inner = above.join("inner");
+        drop(Made::folder(&inner).unwrap());
+        assert!(!above.exists() && scratch.path().exists());
+        let made = Made::folder(&inner).unwrap();
+        fs::write(inner.join("file"), "mine").unwrap();
+        drop(made);
+        assert!(inner.exists());
+    }
 
     #[test]
     fn a_model_with_a_residual_is_refused_before_the_fit() {

@@ -13,6 +13,7 @@ use crate::campaign::gather::{gather, read_lines};
 use crate::campaign::tables::{Finding, Summary, findings, said, summaries};
 use crate::campaign::{Plan, Record, Store};
 use crate::commands::files::{self, Overwrite};
+use crate::commands::outputs;
 use crate::commands::status::IN_DOUBT;
 use crate::report::CampaignReport;
 
@@ -38,9 +39,8 @@ pub struct Arguments {
 /// Prints the tables, and writes the files that the options request. The exit status is 3 if a cell has no result.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite: Overwrite = arguments.force.into();
-    for path in arguments.report.iter().chain(&arguments.tables) {
-        files::writable(path, overwrite)?;
-    }
+    let written = arguments.report.iter().chain(&arguments.tables);
+    outputs::check(written, &arguments.results, overwrite)?;
     let (plan, store) = arguments.which.open()?;
     let records = arguments.records(&plan, &store)?;
     if records.is_empty() {

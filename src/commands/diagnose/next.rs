@@ -1,10 +1,12 @@
 //! The command to run after a diagnosis.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::iter::once;
+use std::path::{Path, PathBuf};
 
 use super::Arguments;
 use crate::commands::files;
+use crate::commands::intake::LogArguments;
 use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::sysid::compare::Answer;
@@ -16,9 +18,9 @@ use crate::sysid::per_flight::askew;
 const WORTH_TUNING: f64 = 10.0;
 
 /// The command to run next; empty for a `given` model with a learned residual, which `amend` refuses. `words` maps the id of an
-/// effect to the path of its effect file. `answer` has the free-run errors as given, tuned, and with the asserted effects.
+/// effect to the path of its effect file. `used` are the logs that were diagnosed. `answer` has the free-run errors as given, tuned, and with the asserted effects.
 pub(super) fn next(
-    arguments: &Arguments,
+    (arguments, used): (&Arguments, &LogArguments),
     given: &GreyBox,
     diagnosis: &Diagnosis,
     words: &BTreeMap<String, String>,
@@ -28,8 +30,8 @@ pub(super) fn next(
         return String::new();
     }
     let model = &arguments.model;
-    let out = model.parent().unwrap_or(Path::new("")).join("amended");
-    let (model, out, logs) = (quoted(model), quoted(&out), arguments.logs.words());
+    let out = free(model.parent().unwrap_or(Path::new("")));
+    let (model, out, logs) = (quoted(model), quoted(&out), used.words());
     let between = diagnosis.advice.iter().find_map(|a| a.between.as_ref());
     match (diagnosis.verdict, between) {
         (Verdict::Effect, Some(pair)) if in_doubt(diagnosis) => design(&model, pair, words),
@@ -51,11 +53,17 @@ pub(super) fn next(
             format!("greylag amend --model {model}{logs} --tune-only --out {out}")
         }
         // `propose` needs two flights: it searches a formula on one and tests it on the other
-        (Verdict::Unexplained, _) if arguments.logs.paths.len() < 2 => String::new(),
+        (Verdict::Unexplained, _) if used.paths.len() < 2 => String::new(),
         (Verdict::Unexplained, _) => format!("greylag propose --model {model}{logs}"),
         // the flights themselves are in doubt, so the logs are inspected first
-        (Verdict::Unknown, _) => arguments.logs.inspected(&arguments.model),
+        (Verdict::Unknown, _) => used.inspected(&arguments.model),
     }
+}
+
+/// A folder in `parent` that does not exist: `amended`, or the first of `amended-2`, `amended-3` and so on.
+fn free(parent: &Path) -> PathBuf {
+    let names = once("amended".to_owned()).chain((2u32..).map(|k| format!("amended-{k}")));
+    names.map(|name| parent.join(name)).find(|folder| !folder.exists()).unwrap_or_default()
 }
 
 /// The option of `greylag amend` that adds the effects `ids`. With `--accept` the command would diagnose the fitted logs alone
@@ -138,6 +146,16 @@ mod tests {
             assert_eq!(added, option);
             let line = format!("greylag amend --model m.toml --log a.csv {added} --out amended");
             assert!(matches!(command_of(&words(&line)), Ok(Command::Amend(_))), "{line}");
+        }
+    }
+
+    #[test]
+    fn the_folder_that_is_proposed_is_free() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["amended", "amended-2", "amended-3"] {
+            let proposed = free(folder.path());
+            assert_eq!(proposed, folder.path().join(name));
+            std::fs::create_dir(proposed).unwrap();
         }
     }
 

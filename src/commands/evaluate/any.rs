@@ -34,7 +34,7 @@ pub(super) struct AnyArguments {
     change: bool,
     /// Models whose aircraft --any flies too. A controller that needs a model is designed from the model that it flies.
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "any")]
-    beside: Vec<PathBuf>,
+    pub(super) beside: Vec<PathBuf>,
 }
 
 /// Information from which a controller is designed.

@@ -12,6 +12,7 @@ use crate::commands::files::{self, shipped};
 use crate::commands::given;
 use crate::commands::held_out;
 use crate::commands::intake::LogArguments;
+use crate::commands::outputs;
 use crate::commands::status::IN_DOUBT;
 use crate::learn::dynamics::export;
 use crate::logs::quoted;
@@ -33,7 +34,7 @@ const HIGHER: f64 = 1.01;
 /// Options of `greylag train residual`.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Exit status: 0 done, 1 nothing was written, 3 not written, for the residual does not lower the error, or written, but a log was left out."
+    after_help = "Exit status: 0 written; 1 an error, nothing was written; 3 not written, for the residual does not lower the error, or written, but a log was left out."
 )]
 pub struct Arguments {
     /// Model file to correct; it stays as it is. Fit its coefficients first: greylag amend --tune-only.
@@ -63,6 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         );
     }
     distinct(&arguments.logs.paths, &arguments.hold_out)?;
+    outputs::separate(&[arguments.out.join(export::MODEL)], given::files(&arguments.model))?;
     if arguments.out.is_dir() {
         files::writable(&arguments.out.join(export::MODEL), arguments.force.into())?;
     }
@@ -101,8 +103,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         return Ok(ExitCode::from(IN_DOUBT));
     }
     arguments.write(&corrected, &path, &fit)?;
-    let judged = if held.is_empty() { fit } else { held };
-    println!("next: {}", arguments.next(judged));
+    let judged = arguments.logs.of(if held.is_empty() { fit } else { held });
+    println!("next: {}", arguments.next(&judged.among(&taken.used)));
     Ok(if taken.in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
@@ -126,9 +128,9 @@ impl Arguments {
     }
 
     /// The command that compares the model and its correction with the logs `judged`.
-    fn next(&self, judged: Vec<PathBuf>) -> String {
+    fn next(&self, judged: &LogArguments) -> String {
         let [given, out] = [&self.model, &self.out.join(export::MODEL)].map(|path| quoted(path));
-        format!("greylag compare --model {given} {out}{}", self.logs.of(judged).words())
+        format!("greylag compare --model {given} {out}{}", judged.words())
     }
 }
 

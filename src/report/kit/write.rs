@@ -1,6 +1,6 @@
 //! Atomic writing of files: another process sees a file complete or not at all.
 
-use std::fs::File;
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -39,13 +39,33 @@ pub fn write_new(path: &Path, text: &str) -> Result<(), WriteError> {
     })
 }
 
-/// Writes `content` to a file at `path`, and replaces an existing one. Another process sees either the old or the new file.
+/// Longest chain of symbolic links that is followed. Linux has the same limit.
+const LINKS: usize = 40;
+
+/// Writes `content` to a file at `path`, and replaces an existing one. Another process sees either the old or the new file. A
+/// symbolic link remains, and its target is replaced. A device or a named pipe is opened and receives the content.
 ///
 /// # Errors
 /// `WriteError::Io` if the operating system reports an error.
 pub fn write_over(path: &Path, content: impl AsRef<[u8]>) -> Result<(), WriteError> {
-    let file = written_beside(path, content.as_ref()).map_err(|source| io_error(path, source))?;
-    file.persist(path).map(sync).map_err(|e| io_error(path, e.error))
+    let (content, wrong) = (content.as_ref(), |source| io_error(path, source));
+    if fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+        let open = OpenOptions::new().write(true).open(path);
+        return open.and_then(|mut device| device.write_all(content)).map_err(wrong);
+    }
+    let target = target(path);
+    let file = written_beside(&target, content).map_err(wrong)?;
+    file.persist(&target).map(sync).map_err(|e| wrong(e.error))
+}
+
+/// The target of the symbolic link `path`, which need not exist; `path` itself if it is no link.
+fn target(path: &Path) -> PathBuf {
+    let mut target = path.to_owned();
+    for _ in 0..LINKS {
+        let Ok(next) = fs::read_link(&target) else { break };
+        target = target.parent().unwrap_or(Path::new("")).join(next);
+    }
+    target
 }
 
 fn io_error(path: &Path, source: io::Error) -> WriteError {
