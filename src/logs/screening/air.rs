@@ -20,8 +20,10 @@ const FOUND: f64 = 0.15;
 const ROUGH: f64 = 0.2;
 /// Largest relative error of the ratio of [`by_wind`]. In right logs of simulated flights it was below 0.05.
 const SHARP: f64 = 0.07;
-/// Correlation above which the ratio of [`by_wind`] is used, and about how many rows it takes from a long log.
+/// Correlation above which the ratio of [`by_wind`] is used, the least standard deviation of the velocity relative to the air,
+/// relative to its size, and about how many rows are taken from a long log.
 const CLOSE: f64 = 0.98;
+const TURNS: f64 = 0.1;
 const MOST: usize = 10_000;
 /// Largest relative difference of the altitude's rate of climb from the one that airspeed and pitch give in the same unit.
 const CLIMB: f64 = 0.3;
@@ -85,6 +87,12 @@ fn by_wind(rows: &[Sample]) -> Option<f64> {
     let all: Vec<[f64; 4]> = finite.step_by(rows.len() / MOST + 1).collect();
     let mean = |i: usize| all.iter().map(|row| row[i]).sum::<f64>() / all.len() as f64;
     let means: [f64; 4] = std::array::from_fn(mean);
+    let square = |x: f64, y: f64| x * x + y * y;
+    let size: f64 = all.iter().map(|row| square(row[0], row[2])).sum();
+    let moved: f64 = all.iter().map(|row| square(row[0] - means[0], row[2] - means[2])).sum();
+    if moved < TURNS * TURNS * size {
+        return None;
+    }
     let pairs = all.iter().flat_map(|row| {
         [(row[0] - means[0], row[1] - means[1]), (row[2] - means[2], row[3] - means[3])]
     });
@@ -205,4 +213,51 @@ fn density(rows: &[Sample]) -> Option<Finding> {
             "the logged air density is {metres:.2} times that of the standard atmosphere at the logged altitude: one of air_density_kgpm3 and altitude_m is in another unit; map it, or leave the density out"
         ))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 40 s of level flight at 17 m/s in a wind of 3 m/s, on a course that swings by ±`swing` rad. The airspeed is logged times
+    /// `factor`.
+    fn flown(swing: f64, factor: f64) -> Vec<Sample> {
+        let one = |k: usize| {
+            let time_s = 0.1 * k as f64;
+            let yaw = swing * (0.4 * time_s).sin();
+            Sample {
+                time_s,
+                attitude_rad: [0.0, 0.0, yaw],
+                rates_radps: [0.0, 0.0, 0.4 * swing * (0.4 * time_s).cos()],
+                airspeed_mps: 17.0 * factor,
+                velocity_ned_mps: [17.0 * yaw.cos() + 3.0, 17.0 * yaw.sin(), 0.0],
+                ..Sample::default()
+            }
+        };
+        (0..400).map(one).collect()
+    }
+
+    #[test]
+    fn a_flight_that_turns_shows_the_unit_of_the_airspeed_in_wind() {
+        for (unit, mps) in SPEEDS {
+            let found = airspeed(&flown(0.8, 1.0 / mps)).unwrap();
+            assert!(found.text.contains(&format!("looks like {unit}, not")), "{}", found.text);
+            let scale = found.cure.unwrap().scale;
+            assert!(near(scale, mps, 1e-5), "{unit} {scale}");
+        }
+        assert!(airspeed(&flown(0.8, 1.0)).is_none());
+    }
+
+    #[test]
+    fn a_straight_flight_leaves_two_units_open() {
+        // the wind makes 3.6 times the airspeed 3.06 times the velocity over ground
+        let found = airspeed(&flown(0.01, 3.6)).unwrap();
+        assert!(found.text.contains("ft/s or km/h, not m/s (it is 3.06 times"), "{}", found.text);
+        assert!(found.cure.is_none());
+        let scales: Vec<f64> = found.choices.iter().map(|cure| cure.scale).collect();
+        assert_eq!(scales, [0.3048, 0.277778]);
+        for line in ["scale = 0.3048 } for ft/s", "scale = 0.277778 } for km/h"] {
+            assert!(found.text.contains(line), "{}", found.text);
+        }
+    }
 }

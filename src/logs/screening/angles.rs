@@ -148,3 +148,20 @@ fn relations(windows: &[&[Sample]]) -> [Option<Relation>; 3] {
     };
     [against(&roll, 0), against(&pitch, 1), against(&turn, 2)]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bank_decides_between_yaw_and_its_rate() {
+        let [yaw, rate] = [0.9, -0.9].map(|bank| yaw_turned(Some(bank)));
+        assert_eq!(yaw.cure, Some(Cure { offset: 1.5708, ..Cure::factor("yaw_rad", -1.0) }));
+        assert_eq!(rate.cure, Some(Cure::factor("r_radps", -1.0)));
+        let open = yaw_turned(None);
+        assert!(open.cure.is_none() && open.corrects("yaw_rad") && open.corrects("r_radps"));
+        for line in ["scale = -1, offset = 1.5708 } for yaw", "scale = -1 } for the yaw rate"] {
+            assert!(open.text.contains(line), "{}", open.text);
+        }
+    }
+}
