@@ -56,6 +56,9 @@ impl Reading {
         let log = logs::load(path, &self.options()?).map_err(said)?;
         match log.problems().filter(|_| !self.despite_problems) {
             None => Ok(log),
+            Some(problems) if log.flown_s() == 0.0 => {
+                Err(format!("flight log {}: {problems}", path.display()))
+            }
             Some(problems) => Err(format!(
                 "flight log {}: {problems}. Every figure would be wrong. If the log is right all the same, \
                  give despite_problems=True",

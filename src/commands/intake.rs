@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
+use super::mapping_file::converted;
 use super::{bar, given, mistake};
-use crate::logs::finding::{Finding, Severity};
+use crate::logs::finding::{Cure, Finding, Severity};
 use crate::logs::mapping::Mapping;
 use crate::logs::phases::Flying;
 use crate::logs::quoted;
@@ -245,12 +246,14 @@ impl Reading {
         reading.flies = reading.mapping.flies(Some(flies));
         reading.mapping = reading.mapping.with_mixer(setting.model.airframe.mixer.clone());
         let (mut intake, mut places) = (Intake::default(), Vec::new());
+        let cure: fn(&Path) -> String = if paths.len() > 1 { converted } else { mapped };
         for (k, (path, name)) in paths.iter().zip(logs::names(paths)).enumerate() {
             if !bar::is_silent() {
                 eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, paths.len());
             }
-            let read = given::log(path)
-                .and_then(|()| logs::flights(path, &reading).map_err(|e| units_first(path, e)));
+            let read = given::log(path).and_then(|()| {
+                logs::flights(path, &reading).map_err(|e| units_first(path, cure, e))
+            });
             let logs = match read {
                 Ok(logs) => logs,
                 Err(error) if paths.len() == 1 => {
@@ -266,7 +269,8 @@ impl Reading {
                 let number = log.flight.name.rsplit_once('#').map(|(_, n)| n.to_owned());
                 let number = number.unwrap_or_else(|| (k + 1).to_string());
                 let name = if several { format!("{name}#{number}") } else { name.clone() };
-                match self.reconstruct_one(path, &name, log, setting) {
+                let usable = self.usable(path, &log, cure);
+                match usable.and_then(|()| self.reconstruct_one(path, &name, log, setting)) {
                     Ok((flight, findings)) => {
                         intake.add(flight, &name, &findings);
                         places.push((path.as_path(), k));
@@ -287,6 +291,11 @@ impl Reading {
         Ok(intake)
     }
 
+    /// Refuses a log with problems, unless the user wants it. `cure` is the remedy for the file at `path`.
+    fn usable(&self, path: &Path, log: &Log, cure: fn(&Path) -> String) -> Result<()> {
+        if self.despite_problems { Ok(()) } else { refuse_problems(path, log, cure) }
+    }
+
     /// The reconstructed flight of a log, with the findings about the file.
     fn reconstruct_one(
         &self,
@@ -295,16 +304,21 @@ impl Reading {
         log: Log,
         setting: &Setting,
     ) -> Result<(Reconstruction, Vec<Finding>)> {
-        if !self.despite_problems {
-            refuse_problems(path, &log.findings)?;
-        }
         let findings = log.findings.clone();
         Ok((setting.reconstruct(path, name, log)?, findings))
     }
 }
 
-/// The error of a log that cannot be read. If wrong units explain the error, it names the command that corrects them.
-fn units_first(path: &Path, error: logs::LogError) -> anyhow::Error {
+/// The remedy for a single log at `path`: the command that writes a mapping, and the option that reads it.
+fn mapped(path: &Path) -> String {
+    format!(
+        "to put it right: greylag logs info {} --write-mapping mapping.toml\n  then add: --mapping mapping.toml",
+        quoted(path)
+    )
+}
+
+/// The error of a log that cannot be read. If wrong units explain the error, it names the remedy `cure`.
+fn units_first(path: &Path, cure: fn(&Path) -> String, error: logs::LogError) -> anyhow::Error {
     let hint = match &error {
         logs::LogError::Csv { hint, .. } | logs::LogError::Unusable { hint, .. } => hint,
         _ => "",
@@ -312,43 +326,33 @@ fn units_first(path: &Path, error: logs::LogError) -> anyhow::Error {
     if !hint.contains("--mapping") {
         return error.into();
     }
-    let (text, log) = (error.to_string(), quoted(path));
+    let text = error.to_string();
     let what = text.split("; first").next().unwrap_or_default();
-    anyhow::anyhow!(
-        "{what}): units look wrong (degrees, say)\n  to put it right: greylag logs info {log} --write-mapping mapping.toml\n  \
-         then add: --mapping mapping.toml"
-    )
+    anyhow::anyhow!("{what}): units look wrong (degrees, say)\n  {}", cure(path))
 }
 
 /// Refuses a log with a problem (a finding that makes the results wrong). If a mapping can correct the log, the error names the
-/// command that writes the mapping.
-fn refuse_problems(path: &Path, findings: &[Finding]) -> Result<()> {
+/// remedy `cure`. The option for logs with problems is named only for a log with a flight, for no other can be used.
+fn refuse_problems(path: &Path, log: &Log, cure: fn(&Path) -> String) -> Result<()> {
     let problems: Vec<&Finding> =
-        findings.iter().filter(|f| f.severity == Severity::Problem).collect();
+        log.findings.iter().filter(|f| f.severity == Severity::Problem).collect();
     if problems.is_empty() {
         return Ok(());
     }
-    let log = quoted(path);
     // For a problem that a factor corrects, the message names only the column. The command in the message explains the problem.
     let said = |f: &&Finding| match &f.cure {
-        Some(cure) => {
-            format!("{} has a wrong unit or sign (read it times {:.4})", cure.column, cure.scale)
+        Some(Cure { column, scale, offset }) => {
+            let plus = if *offset == 0.0 { String::new() } else { format!(" plus {offset}") };
+            format!("{column} has a wrong unit or sign (read it times {scale:.4}{plus})")
         }
         None => f.text.trim_end_matches('.').to_owned(),
     };
     let all: Vec<String> = problems.iter().map(said).collect();
-    let right = "if the log is right all the same, use it with --despite-problems";
+    let right = ". Every figure would be wrong; if the log is right all the same, use it with --despite-problems";
+    let right = if log.flown_s() > 0.0 { right } else { "" };
     let curable = problems.iter().all(|f| f.cure.is_some());
-    match curable {
-        true => bail!(
-            "flight log {log}: {}. Every figure would be wrong; {right}\n  to put it right: greylag logs info {log} \
-             --write-mapping mapping.toml\n  then add: --mapping mapping.toml",
-            all.join("; ")
-        ),
-        false => {
-            bail!("flight log {log}: {}. Every figure would be wrong; {right}", all.join("; "))
-        }
-    }
+    let cure = if curable { format!("\n  {}", cure(path)) } else { String::new() };
+    bail!("flight log {}: {}{right}{cure}", quoted(path), all.join("; "))
 }
 
 #[cfg(all(test, feature = "study"))]

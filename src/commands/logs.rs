@@ -137,14 +137,15 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
                 model.as_deref().map(|path| GreyBox::load(&files::shipped(path))).transpose()?;
             let options = reading.options(model.as_ref())?;
             let (logs, broken) = inspected(files, &options)?;
-            let all: Vec<Info> = logs.iter().map(Info::of).collect();
+            let all: Vec<Info> = logs.iter().map(|(_, log)| Info::of(log)).collect();
             match (json, &all[..]) {
                 (true, [only]) if !broken => println!("{}", serde_json::to_string_pretty(only)?),
                 (true, all) => println!("{}", serde_json::to_string_pretty(all)?),
                 (false, all) => print_all(all),
             }
             if let Some(path) = write_mapping {
-                write_mapping_file(path, &all)?;
+                let files = logs.into_iter().map(|(file, _)| file);
+                write_mapping_file(path, &files.zip(all).collect::<Vec<_>>())?;
                 return Ok(status(broken.then_some(Severity::Problem)));
             }
             let worst = all.iter().map(Info::severity).max();
@@ -173,16 +174,16 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
 }
 
-/// The flights of the logs in `files`, and whether any log could not be read. Errors of such logs are printed to standard
-/// error.
+/// The flights of the logs in `files`, each with its file, and whether any log could not be read. Errors of such logs are
+/// printed to standard error.
 ///
 /// # Errors
 /// The error of the last log if none can be read.
-fn inspected(files: &[PathBuf], options: &Options) -> Result<(Vec<Log>, bool)> {
+fn inspected(files: &[PathBuf], options: &Options) -> Result<(Vec<(PathBuf, Log)>, bool)> {
     let (mut logs, mut broken) = (Vec::new(), Vec::new());
     for file in files {
         match crate::logs::inspect_all(file, options) {
-            Ok(flights) => logs.extend(flights),
+            Ok(flights) => logs.extend(flights.into_iter().map(|log| (file.clone(), log))),
             Err(why) => broken.push(anyhow::Error::from(why)),
         }
     }
@@ -194,13 +195,24 @@ fn inspected(files: &[PathBuf], options: &Options) -> Result<(Vec<Log>, bool)> {
     }
 }
 
-/// Writes the mapping file that corrects the wrong units and signs found in `logs`.
-fn write_mapping_file(path: &Path, logs: &[Info]) -> Result<()> {
-    let Some(text) = mapping(logs) else {
+/// Writes the mapping file that corrects the wrong units and signs found in `logs`. Corrections that the user must choose or write
+/// are only named.
+fn write_mapping_file(path: &Path, logs: &[(PathBuf, Info)]) -> Result<()> {
+    let findings = || logs.iter().flat_map(|(_, info)| &info.findings);
+    let by_hand = findings().any(|f| f.cure.is_none() && f.text.contains("--mapping FILE"));
+    let Some(text) = mapping(logs)? else {
+        if by_hand {
+            bail!(
+                "no mapping was written, for the corrections must be chosen by hand: write the right lines of those above into a mapping, below the lines `schema = 1` and `[columns]`"
+            );
+        }
         bail!("no factor puts anything of these logs right, so no mapping was written");
     };
     files::write(path, &text, files::Overwrite::New)?;
     println!("\nwrote {}; add: --mapping {}", path.display(), quoted(path));
+    if by_hand {
+        println!("not in it: corrections that must be chosen by hand (see the problems above)");
+    }
     Ok(())
 }
 

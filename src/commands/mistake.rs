@@ -6,9 +6,13 @@ use std::io::{self, ErrorKind};
 use super::one_line::one_line;
 
 /// General remedies that error texts contain. [`text`] replaces them by the remedy of [`cure`], if there is one.
-const ANY_CURE: [&str; 4] = [
+///
+/// A text that begins with another one stands before it.
+const ANY_CURE: [&str; 6] = [
     ": check the path and its permissions",
+    ": check the path",
     "; check that its folder exists, can be written to and has room",
+    "; check that it exists and may be read and written",
     "; check that it exists and may be read",
     "; name a file that exists",
 ];
@@ -104,5 +108,10 @@ mod tests {
         assert!(denied.starts_with("cannot read a.csv: Permission denied; change its"), "{denied}");
         let gone = text_of(ErrorKind::NotFound, 2, "making a folder at path \"/proc/.tmpEHi2\"");
         assert_eq!(gone, "making a folder: No such file or directory; check the path");
+        for remedy in [": check the path", "; check that it exists and may be read and written"] {
+            let text = format!("cannot use a.csv: No such file or directory (os error 2){remedy}");
+            let gone = text_of(ErrorKind::NotFound, 2, &text);
+            assert_eq!(gone, "cannot use a.csv: No such file or directory; check the path");
+        }
     }
 }

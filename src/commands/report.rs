@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::Args;
 
 use crate::commands::files;
@@ -33,6 +33,12 @@ pub struct Arguments {
 /// If a file of the recording, the model or the policy cannot be read, or the page cannot be written.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let folder = &arguments.folder;
+    if !folder.is_dir() {
+        bail!(
+            "there is no folder {}: name the one that `greylag fly` printed, which holds flight.csv",
+            folder.display()
+        );
+    }
     let page = arguments.out.clone().unwrap_or_else(|| folder.join("report.html"));
     let overwrite = arguments.force.into();
     files::writable(&page, overwrite)?;

@@ -19,13 +19,20 @@ pub enum Severity {
     Problem,
 }
 
-/// A factor that corrects a column. Its `Display` text is the entry for a mapping file.
+/// A factor, and for some columns a constant, that correct a column. The `Display` text has the entry for a mapping file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cure {
     /// Name of the column to be corrected.
     pub column: String,
     /// Factor by which the column is multiplied.
     pub scale: f64,
+    /// Constant that is added to the multiplied column, in the column's unit.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub offset: f64,
+}
+
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
 }
 
 /// Groups of columns with a common unit. A finding about a wrong unit names the first column of its group.
@@ -36,6 +43,21 @@ const ALIKE: [[&str; 3]; 3] = [
 ];
 
 impl Cure {
+    /// The correction that multiplies `column` by `scale`.
+    pub fn factor(column: impl Into<String>, scale: f64) -> Cure {
+        Cure { column: column.into(), scale, offset: 0.0 }
+    }
+
+    /// The line of a mapping file that makes the correction in a CSV table.
+    pub fn line(&self) -> String {
+        self.line_of(&Entry::scaled(TEXT, &self.column, 1.0), Format::Csv)
+    }
+
+    /// The line of a mapping file that makes the correction in a log of `format`, in which `entry` fills the column.
+    fn line_of(&self, entry: &Entry, format: Format) -> String {
+        format!("{} = {}", self.column, entry.corrected(self.scale, self.offset, format))
+    }
+
     /// The columns that are multiplied: the column itself. If its unit is wrong, the unit of its whole group is.
     pub fn columns(&self) -> Vec<&str> {
         let group = ALIKE.iter().find(|group| group[0] == self.column && self.scale > 0.0);
@@ -45,10 +67,11 @@ impl Cure {
 
 impl std::fmt::Display for Cure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Cure { column, scale } = self;
         write!(
             f,
-            "read it with --mapping FILE, in which [columns] has {column} = {{ from = \"{TEXT}.{column}\", scale = {scale} }} (in a binary log its topic and field stand in place of {TEXT}.{column})"
+            "read it with --mapping FILE, in which [columns] has {} (in a binary log its topic and field stand in place of {TEXT}.{})",
+            self.line(),
+            self.column
         )
     }
 }
@@ -60,23 +83,35 @@ pub struct Finding {
     pub severity: Severity,
     /// Description of the finding, with a remedy.
     pub text: String,
-    /// The column and the factor that correct the defect; `None` if no factor can.
+    /// The correction of the defect; `None` if the log shows none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cure: Option<Cure>,
+    /// Possible corrections, if the log does not show which of them is right; otherwise empty.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub choices: Vec<Cure>,
 }
 
 impl Finding {
     /// A finding of severity [`Severity::Note`].
     pub fn note(text: impl Into<String>) -> Self {
-        Finding { severity: Severity::Note, text: text.into(), cure: None }
+        Finding::of(Severity::Note, text.into())
     }
     /// A finding of severity [`Severity::Warning`].
     pub fn warning(text: impl Into<String>) -> Self {
-        Finding { severity: Severity::Warning, text: text.into(), cure: None }
+        Finding::of(Severity::Warning, text.into())
     }
     /// A finding of severity [`Severity::Problem`].
     pub fn problem(text: impl Into<String>) -> Self {
-        Finding { severity: Severity::Problem, text: text.into(), cure: None }
+        Finding::of(Severity::Problem, text.into())
+    }
+
+    fn of(severity: Severity, text: String) -> Self {
+        Finding { severity, text, cure: None, choices: Vec::new() }
+    }
+
+    /// Whether the finding proposes a correction of `column`, or several possible ones.
+    pub fn corrects(&self, column: &str) -> bool {
+        self.cure.iter().chain(&self.choices).any(|cure| cure.columns().contains(&column))
     }
 }
 
@@ -100,8 +135,8 @@ pub(super) fn named(
     entries: &BTreeMap<String, Entry>,
     format: Format,
 ) -> Finding {
-    let Some(Cure { column, scale }) = &finding.cure else { return finding };
-    let said = finding.cure.iter().map(Cure::to_string).collect::<String>();
+    let Some(cure) = &finding.cure else { return choices_named(finding, entries, format) };
+    let (Cure { column, scale, .. }, said) = (cure, cure.to_string());
     let Some(entry) = entries.get(column) else {
         let better = format!(
             "{column} is computed from several fields or from servo pulses, so that no factor in a mapping corrects it: state what the outputs drive in [surfaces] of an airframe file (--airframe), or name another field in a mapping (--mapping)"
@@ -115,10 +150,23 @@ pub(super) fn named(
         ));
     }
     let better = format!(
-        "read it with --mapping FILE, in which [columns] has {column} = {}",
-        entry.times(*scale, format)
+        "read it with --mapping FILE, in which [columns] has {}",
+        cure.line_of(entry, format)
     );
     Finding { text: finding.text.replace(&said, &better), ..finding }
+}
+
+/// Adapts the possible corrections of `finding` to the log, as [`named`] does for a single one.
+fn choices_named(finding: Finding, entries: &BTreeMap<String, Entry>, format: Format) -> Finding {
+    let better = |cure: &Cure| match entries.get(&cure.column) {
+        Some(entry) => cure.line_of(entry, format),
+        None => format!("{} times {}", cure.column, cure.scale),
+    };
+    let text = finding
+        .choices
+        .iter()
+        .fold(finding.text.clone(), |text, cure| text.replace(&cure.line(), &better(cure)));
+    Finding { text, ..finding }
 }
 
 impl std::fmt::Display for Finding {
@@ -141,7 +189,7 @@ mod tests {
 
     #[test]
     fn a_cure_of_a_log_has_its_field_with_the_readers_own_factor() {
-        let cure = Cure { column: "elevator_cmd".into(), scale: -1.0 };
+        let cure = Cure::factor("elevator_cmd", -1.0);
         let found =
             Finding { cure: Some(cure.clone()), ..Finding::problem(format!("turned: {cure}")) };
         let entry = Entry {
@@ -163,8 +211,22 @@ mod tests {
     }
 
     #[test]
+    fn each_choice_has_the_field_of_the_log() {
+        let yaw = Cure { offset: 1.5708, ..Cure::factor("yaw_rad", -1.0) };
+        let choices = vec![yaw, Cure::factor("r_radps", -1.0)];
+        let lines: Vec<String> = choices.iter().map(Cure::line).collect();
+        let found = Finding { choices, ..Finding::problem(lines.join(", or ")) };
+        assert!(found.corrects("r_radps") && !found.corrects("p_radps"));
+        let entry = Entry { offset: 0.5, ..Entry::scaled("ATT", "Yaw", 0.0174533) };
+        let entries = BTreeMap::from([("yaw_rad".to_owned(), entry)]);
+        let said = named(found, &entries, Format::Dataflash).text;
+        let line = "yaw_rad = { from = \"ATT.Yaw\", scale = -0.0174533, offset = 1.0708 }";
+        assert!(said.starts_with(line) && said.ends_with("r_radps times -1"), "{said}");
+    }
+
+    #[test]
     fn the_sentence_of_a_cure_holds_a_line_of_a_mapping() {
-        let cure = Cure { column: "airspeed_mps".into(), scale: 0.514444 };
+        let cure = Cure::factor("airspeed_mps", 0.514444);
         let said = cure.to_string();
         let (_, line) = said.split_once("[columns] has ").unwrap();
         let (line, _) = line.split_once('}').unwrap();

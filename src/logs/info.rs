@@ -145,8 +145,16 @@ fn filled(samples: &[Sample]) -> [usize; COLUMNS.len()] {
     counts
 }
 
+/// Whether `log` is a table without usable rows, for instance one without times. Its header then states what it has.
+fn has_only_a_header(log: &Log) -> bool {
+    log.format == Format::Csv && log.flight.samples.is_empty()
+}
+
 /// Whether `column` counts as present in `log`. `filled` has the number of rows with a value, for each column.
 fn has(log: &Log, filled: &[usize; COLUMNS.len()], column: &str) -> bool {
+    if has_only_a_header(log) {
+        return log.entries.contains_key(column);
+    }
     let samples = &log.flight.samples;
     let whole = samples.first().zip(samples.last()).map_or(0.0, |(a, b)| b.time_s - a.time_s);
     let count = index(column).map_or(0, |place| filled[place]);
@@ -183,6 +191,9 @@ fn weighed(log: &Log, flight_s: f64, mut purpose: Purpose) -> Purpose {
     if log.flight.samples.is_empty() && !log.hovers.is_empty() {
         purpose.missing = vec!["a flight on its wings".into()];
         return purpose;
+    }
+    if has_only_a_header(log) && !log.entries.contains_key("time_s") {
+        purpose.missing.insert(0, "time_s".into());
     }
     if flight_s == 0.0 && purpose.missing.is_empty() {
         purpose.missing.push("a flight".into());

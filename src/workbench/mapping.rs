@@ -74,7 +74,7 @@ impl Inner {
         if !info.entries.contains_key(column) {
             return Err(WorkbenchError::Computed(column.to_owned()));
         }
-        let cure = Cure { column: column.to_owned(), scale };
+        let cure = Cure::factor(column, scale);
         let entries = cure.columns().into_iter().filter_map(|c| Some((c, info.entries.get(c)?)));
         let entries: Vec<_> = entries.collect();
         if self.given.mapping.is_some() {

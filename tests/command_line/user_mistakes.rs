@@ -53,7 +53,11 @@ const FILES: [Mistake; 22] = [
     ("aircraft check --model @/good.csv", 1, &["is a flight log", ".toml"]),
     ("compare --model @/typo.toml --log @/good.csv", 1, &["typo.toml", "line"]),
     ("compare --model @/alone/model.toml --log @/good.csv", 1, &["airframe.toml"]),
-    ("compare --model @/model.toml --log @/good.csv --mapping @/none.toml", 1, &["none.toml"]),
+    (
+        "compare --model @/model.toml --log @/good.csv --mapping @/none.toml",
+        1,
+        &["none.toml: No such file or directory; check the path\n"],
+    ),
     ("compare --model @/model.toml --log @/good.csv --mapping @/picture.csv", 1, &["picture.csv"]),
     ("logs info @/gone.csv", 1, &["gone.csv", "check the path"]),
     ("logs info @/picture.csv", 1, &["no flight log"]),
@@ -315,7 +319,18 @@ fn check(mistakes: &[Mistake]) {
 }
 
 /// Mistakes with logs and places that a first look at the list of a first hour does not have.
-const MORE: [Mistake; 20] = [
+const MORE: [Mistake; 23] = [
+    (
+        "logs info @/good.csv @/milliseconds.csv --write-mapping @/new.toml",
+        1,
+        &["different corrections of time_s", "good.csv none", "logs convert"],
+    ),
+    ("report @/nowhere", 1, &["there is no folder", "nowhere"]),
+    (
+        "workbench --model @/model.toml --dir @/session @/gone.csv",
+        1,
+        &["gone.csv: No such file or directory; check the path\n"],
+    ),
     ("diagnose --model @/model.toml --log @/gone.csv", 1, &["gone.csv", "check the path"]),
     ("diagnose --model @/model.toml --log @/short.csv", 1, &["no flight in this log"]),
     ("diagnose --model @/model.toml --log @/good.csv --without flubber", 1, &["flubber"]),
@@ -352,7 +367,7 @@ const MORE: [Mistake; 20] = [
     ("aircraft check --model @/none.toml", 1, &["none.toml"]),
     ("aircraft new @/new --mass-kg 2.1 --span-m 1.6 --area-m2 0.3 --tail canard", 2, &["canard"]),
     ("compare --model @/model.toml --log @/milliseconds.csv", 1, &["time_s", "--write-mapping"]),
-    ("compare --model @/model.toml --log @/kmh.csv", 1, &["airspeed", "--write-mapping"]),
+    ("compare --model @/model.toml --log @/kmh.csv", 1, &["airspeed", "mapping"]),
     ("compare --model @/model.toml --log @/no-header.csv", 1, &["time_s"]),
     ("compare --model @/model.toml --log @/good.csv --source airspeed", 2, &["--source"]),
     ("workbench --model @/model.toml --port 99999 --dir @/session", 2, &["99999", "--port"]),
@@ -408,6 +423,30 @@ fn a_log_that_was_mistyped_does_not_spoil_the_folder() {
     assert!(!run(&format!("{line}god.csv"), folder).status.success());
     let again = run(&format!("{line}good.csv"), folder);
     assert!(folder.join("own/model.toml").exists(), "{}", answer(&again));
+}
+
+#[test]
+fn one_of_several_logs_is_put_right_alone() {
+    let scratch = tempfile::Builder::new().prefix("mistakes").tempdir().unwrap();
+    let folder = scratch.path();
+    files(folder);
+    let compared = run("compare --model @/model.toml --log @/good.csv @/degrees.csv", folder);
+    let said = answer(&compared);
+    assert_eq!(compared.status.code(), Some(3), "{said}");
+    for words in [
+        "degrees.csv --write-mapping degrees.toml",
+        "degrees.csv degrees-corrected.csv --mapping degrees.toml",
+    ] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    for line in [
+        "logs info @/degrees.csv --write-mapping @/degrees.toml",
+        "logs convert @/degrees.csv @/degrees-corrected.csv --mapping @/degrees.toml",
+        "logs info @/good.csv @/degrees-corrected.csv",
+    ] {
+        let done = run(line, folder);
+        assert!(done.status.success(), "{line}: {}", answer(&done));
+    }
 }
 
 #[test]

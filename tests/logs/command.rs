@@ -112,7 +112,9 @@ fn info_says_of_a_table_without_a_column_what_it_still_serves_for() {
     let path = put(folder.path(), "timeless.csv", timeless.as_bytes());
     let output = greylag(&["info", path.to_str().unwrap()]);
     assert_eq!(output.status.code(), Some(3));
-    assert!(text(&output.stdout).contains("has no column `time_s`"), "{}", text(&output.stdout));
+    let said = text(&output.stdout);
+    assert!(said.contains("has no column `time_s`"), "{said}");
+    assert!(said.contains("comparison in free run: no, for want of time_s\n"), "{said}");
     // What is computed with is still refused.
     assert!(logs::load(&path, &Options::default()).is_err());
 }

@@ -105,10 +105,16 @@ impl Entry {
 
     /// Text of the entry in a mapping file for logs of `format`, with the column multiplied by `factor`.
     pub fn times(&self, factor: f64, format: Format) -> String {
+        self.corrected(factor, 0.0, format)
+    }
+
+    /// The same text, with `more` (in the column's unit) added to the multiplied column.
+    pub fn corrected(&self, factor: f64, more: f64, format: Format) -> String {
+        let offset = self.offset * factor + more;
         let from = toml::Value::from(format!("{}.{}", self.topic, self.field));
         let mut text = format!("{{ from = {from}, scale = {}", self.scale * factor);
-        if self.offset != 0.0 {
-            text += &format!(", offset = {}", self.offset * factor);
+        if offset != 0.0 {
+            text += &format!(", offset = {offset}");
         }
         text += &match self.instance.map(|instance| (instance.to_be_bytes(), instance)) {
             None => String::new(),

@@ -1,6 +1,6 @@
-//! Checks the corrections of a log before they are reported: a column is multiplied by the factor and checked again.
+//! Checks the corrections of a log before they are reported: a column is corrected and checked again.
 //!
-//! A finding is a defect of the log, such as a wrong unit. Its correction is a factor for a column.
+//! A finding is a defect of the log, such as a wrong unit. Its correction is a factor for a column, and a constant for some.
 
 use crate::Sample;
 use crate::columns::{COLUMNS, index};
@@ -18,7 +18,7 @@ pub fn tried(
 ) -> Vec<Finding> {
     let cures = |cure: &Cure| {
         let mended = mended(rows, cure);
-        let same = |f: &Finding| f.cure.as_ref().is_some_and(|c| c.column == cure.column);
+        let same = |f: &Finding| f.cure.iter().chain(&f.choices).any(|c| c.column == cure.column);
         !check(&mended).iter().any(same)
     };
     let one = |finding: Finding| match &finding.cure {
@@ -38,7 +38,10 @@ fn mended(rows: &[Sample], cure: &Cure) -> Vec<Sample> {
     let columns: Vec<usize> = cure.columns().into_iter().filter_map(index).collect();
     let mut rows = rows.to_vec();
     for row in &mut rows {
-        columns.iter().for_each(|i| *COLUMNS[*i].2(row) *= cure.scale);
+        for i in &columns {
+            let value = COLUMNS[*i].2(row);
+            *value = *value * cure.scale + cure.offset;
+        }
     }
     rows
 }
@@ -49,7 +52,7 @@ mod tests {
 
     #[test]
     fn a_cure_after_which_the_column_is_wrong_again_is_not_printed() {
-        let cure = Cure { column: "alpha_rad".into(), scale: 0.0174533 };
+        let cure = Cure::factor("alpha_rad", 0.0174533);
         let found = Finding {
             cure: Some(cure.clone()),
             ..Finding::problem(format!("alpha_rad looks like degrees: {cure}"))

@@ -76,12 +76,18 @@ fn vertical(rows: &[Sample]) -> Option<Finding> {
     })
 }
 
-/// Whether the yaw rate r is negative at bank to the right. In coordinated flight it is positive, because ψ̇ = g tan φ / V.
+/// Whether the yaw rate r is negative at bank to the right.
 fn turns_left(rows: &[Sample]) -> bool {
+    turn_with_bank(rows).is_some_and(|r| r < TURNED)
+}
+
+/// Correlation of the yaw rate r with the bank angle. In coordinated flight it is positive, because ψ̇ = g tan φ / V. `None` for too
+/// few windows.
+pub(super) fn turn_with_bank(rows: &[Sample]) -> Option<f64> {
     let pairs = windows(rows, WINDOW_S)
         .into_iter()
         .map(|w| (mean(w, |s| s.attitude_rad[0].tan()), mean(w, |s| s.rates_radps[2])));
-    with_intercept(pairs).is_some_and(|r| r.correlation < TURNED)
+    with_intercept(pairs).map(|r| r.correlation)
 }
 
 /// Findings on the signs of ax and ay. The measured values are compared with those that follow from the velocity.
@@ -103,7 +109,7 @@ fn along_and_across(rows: &[Sample]) -> Vec<Finding> {
 }
 
 /// Velocity relative to the air, body axes, m/s.
-fn air_velocity(s: &Sample) -> [f64; 3] {
+pub(super) fn air_velocity(s: &Sample) -> [f64; 3] {
     let alpha = if s.alpha_rad.is_finite() { s.alpha_rad } else { 0.0 };
     let beta = if s.beta_rad.is_finite() { s.beta_rad } else { 0.0 };
     let v = s.airspeed_mps;

@@ -117,6 +117,22 @@ fn flight(rows: &[Sample], flies: &Flying) -> Option<Finding> {
 
 /// The problem `what`, with the mapping that multiplies `column` by `scale` as its remedy.
 fn cured(what: String, column: &str, scale: f64) -> Finding {
-    let cure = Cure { column: column.into(), scale };
+    cured_by(what, Cure::factor(column, scale))
+}
+
+/// The problem `what`, of which the log does not show the cause. Each of `choices` is a cause in words and its correction.
+fn undecided(what: &str, choices: Vec<(&str, Cure)>) -> Finding {
+    let lines: Vec<String> =
+        choices.iter().map(|(cause, cure)| format!("{} for {cause}", cure.line())).collect();
+    let text = format!(
+        "{what}. The log does not show which: write one line into [columns] of a mapping and read it with --mapping FILE: {}",
+        lines.join(", or ")
+    );
+    let choices = choices.into_iter().map(|(_, cure)| cure).collect();
+    Finding { choices, ..Finding::problem(text) }
+}
+
+/// The problem `what`, with the mapping that makes the correction `cure` as its remedy.
+fn cured_by(what: String, cure: Cure) -> Finding {
     Finding { cure: Some(cure.clone()), ..Finding::problem(format!("{what}: {cure}")) }
 }
