@@ -54,8 +54,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let measures = new::measures(common, folder, *span_m, *area_m2)?;
     let prior = folder.join("prior");
     let made = [folder, &prior].map(|path| !path.exists());
-    new::files(&prior, &measures.airframe(), &measures.model())?;
-    let model = prior.join("model.toml");
+    // Ctrl-C while the logs are read leaves the prior, with which the same command begins again
+    let left = prior.join("model.toml").exists();
+    let model = new::files_again(&prior, &measures.airframe(), &measures.model())?;
     let fitted = folder.join("model.toml");
     let mut line: Vec<OsString> =
         ["amend", "--from-scratch", "--tune-only", "--model"].map(Into::into).into();
@@ -67,7 +68,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     line.extend(["--report".into(), folder.join("fit.html").into_os_string()]);
     let Command::Amend(amend) = command_of(&line)? else { bail!("greylag amend cannot be run") };
     let status = crate::commands::amend::run(&amend).inspect_err(|_| {
-        remove(folder, &prior, made);
+        if !left {
+            remove(folder, &prior, made);
+        }
     })?;
     if !fitted.exists() {
         println!("the model estimated from the dimensions is in {}", prior.display());
@@ -164,5 +167,29 @@ mod tests {
         assert!(crate::commands::run(command).is_err());
         let left = std::fs::read_dir(&prior).unwrap().map(|e| e.unwrap().file_name());
         assert_eq!(left.collect::<Vec<_>>(), ["notes.txt"]);
+    }
+
+    #[test]
+    fn what_an_interrupted_run_left_is_no_obstacle_and_an_edited_prior_is_one() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = root.path().join("own");
+        let error = |words: &[&str], folder: &Path, rest: &[&str]| {
+            let mut line: Vec<OsString> = words.iter().map(OsString::from).collect();
+            line.push(folder.into());
+            let size = ["--mass-kg", "3.4", "--span-m", "2.1", "--area-m2", "0.75"];
+            line.extend(size.iter().chain(rest).map(OsString::from));
+            crate::commands::run(command_of(&line).unwrap()).err().map(|e| format!("{e:#}"))
+        };
+        let prior = folder.join("prior");
+        assert_eq!(error(&["aircraft", "new"], &prior, &["--name", "own"]), None);
+        let again =
+            || error(&["aircraft", "from-log"], &folder, &["--log", "no-such-log.csv"]).unwrap();
+        let said = again();
+        assert!(said.contains("no-such-log.csv") && !said.contains("exists with"), "{said}");
+        let model = prior.join("model.toml");
+        let edited = std::fs::read_to_string(&model).unwrap() + "# mine\n";
+        std::fs::write(&model, &edited).unwrap();
+        assert!(again().contains("exists with other content"), "{}", again());
+        assert_eq!(std::fs::read_to_string(&model).unwrap(), edited);
     }
 }
