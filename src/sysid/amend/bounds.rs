@@ -78,20 +78,19 @@ mod tests {
     fn only_the_side_at_which_a_fit_ended_is_lifted_and_no_sign_is_allowed_that_is_not_physical() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/prior.toml");
         let mut model = GreyBox::load(&path).unwrap();
-        let of = |model: &GreyBox, name, value| lifted(model, name, value);
         // the value need not be the bound to the bit
-        let lift = of(&model, "drag_linear.CD0", 0.499_999_999);
+        let lift = lifted(&model, "drag_linear.CD0", 0.499_999_999);
         assert_eq!(lift.as_deref(), Some("drag_linear.CD0=0..1"));
-        let lift = of(&model, "drag_linear.CDalpha", -1.0);
+        let lift = lifted(&model, "drag_linear.CDalpha", -1.0);
         assert_eq!(lift.as_deref(), Some("drag_linear.CDalpha=-2..1"));
-        assert_eq!(of(&model, "drag_linear.CD0", 0.0), None);
-        assert_eq!(of(&model, "side_force_linear.CYbeta", 0.5), None);
-        let lift = of(&model, "side_force_linear.CYbeta", -2.0);
+        assert_eq!(lifted(&model, "drag_linear.CD0", 0.0), None);
+        assert_eq!(lifted(&model, "side_force_linear.CYbeta", 0.5), None);
+        let lift = lifted(&model, "side_force_linear.CYbeta", -2.0);
         assert_eq!(lift.as_deref(), Some("side_force_linear.CYbeta=-4..0.5"));
         // the user's own bounds
         assert!(model.set_bounds("roll_linear.Clp", [-0.5, -0.25]));
-        let lift = of(&model, "roll_linear.Clp", -0.25);
+        let lift = lifted(&model, "roll_linear.Clp", -0.25);
         assert_eq!(lift.as_deref(), Some("roll_linear.Clp=-0.5..-0.125"));
-        assert_eq!(of(&model, "roll_linear.Clx", 1.0), None);
+        assert_eq!(lifted(&model, "roll_linear.Clx", 1.0), None);
     }
 }
