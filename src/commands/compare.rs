@@ -16,7 +16,7 @@ use crate::commands::intake::{Intake, LogArguments};
 use crate::commands::outputs;
 use crate::commands::predictions;
 use crate::commands::status::IN_DOUBT;
-use crate::commands::terminal::{print_answer, print_summary, table};
+use crate::commands::terminal::{Tone, painted, print_answer, print_summary, table};
 use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::report::ComparisonReport;
@@ -101,11 +101,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     bar.go_on()?;
     drop(bar);
     in_doubt |= comparison.flights.len() < arguments.logs.paths.len();
+    in_doubt |= !comparison.doubtful.is_empty();
     notes.append(&mut comparison.notes);
     comparison.notes = notes;
-    let next = next(arguments, &arguments.logs.among(&used));
-    let traced = traced(arguments, &models, &flights, &comparison)?;
-    comparison.answer = traced.unwrap_or_else(|| comparison.answer.clone()).then(next);
+    let used = arguments.logs.among(&used);
+    comparison.answer = answer(arguments, &models, &flights, &comparison, &used)?;
     if !files::is_stdout(arguments.json.as_deref()) {
         print(&comparison);
     }
@@ -188,14 +188,25 @@ fn traced(
     Ok(None)
 }
 
-/// The command to run next. `used` are the logs that were compared.
-fn next(arguments: &Arguments, used: &LogArguments) -> String {
-    let files = &arguments.models;
-    let last = quoted(files.last().map_or(Path::new(""), PathBuf::as_path));
-    match files.len() {
+/// The summary with the command to run next. For a model and its amendment it is the summary of `traced`. If an estimate is
+/// physically impossible, the logs are inspected next, and nothing is said about channels. `used` are the logs that were compared.
+fn answer(
+    arguments: &Arguments,
+    models: &[GreyBox],
+    flights: &[Reconstruction],
+    comparison: &Comparison,
+    used: &LogArguments,
+) -> Result<Answer> {
+    let file = arguments.models.last().map_or(Path::new(""), PathBuf::as_path);
+    if !comparison.doubtful.is_empty() {
+        return Ok(comparison.answer.clone().then(used.inspected(file)));
+    }
+    let traced = traced(arguments, models, flights, comparison)?;
+    let last = quoted(file);
+    Ok(traced.unwrap_or_else(|| comparison.answer.clone()).then(match models.len() {
         1 => format!("greylag diagnose --model {last}{}", used.words()),
         _ => format!("greylag aircraft check --model {last}"),
-    }
+    }))
 }
 
 /// The report as HTML.
@@ -213,14 +224,20 @@ fn page(arguments: &Arguments, comparison: &Comparison) -> String {
 }
 
 fn print(comparison: &Comparison) {
+    let doubtful = &comparison.doubtful;
+    doubtful.iter().for_each(|said| println!("{}", painted(said, Tone::Bad)));
     print_answer(&comparison.answer);
     for (model, letter) in comparison.models.iter().zip(letters()) {
         println!("{letter}  {}", model.name);
-        let sentences = model.sentences_worst_first();
-        sentences.iter().for_each(|sentence| println!("   {sentence}"));
+        let sentences = model.sentences_worst_first().into_iter();
+        let own = sentences.filter(|said| doubtful.iter().all(|first| first != said));
+        own.for_each(|sentence| println!("   {sentence}"));
         println!();
     }
-    println!("{}\n{}", free_run_table(comparison), channel_table(&comparison.models));
+    println!("{}", free_run_table(comparison));
+    if doubtful.is_empty() {
+        println!("{}", channel_table(&comparison.models));
+    }
     baselines(comparison).into_iter().for_each(|line| println!("{line}"));
     for flight in &comparison.flights {
         flight.notes.iter().for_each(|note| println!("{}: {note}", flight.name));

@@ -154,7 +154,6 @@ impl LogArguments {
 
     /// The command that inspects the logs. The file `model` states from which airspeed on the aircraft flies. The command lacks the
     /// option for logs with problems, because it names these problems.
-    #[cfg(feature = "study")]
     pub fn inspected(&self, model: &Path) -> String {
         let reading = Reading { despite_problems: false, ..self.reading.clone() };
         let logs: String = self.paths.iter().map(|log| format!(" {}", quoted(log))).collect();

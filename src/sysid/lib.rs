@@ -14,4 +14,5 @@ pub mod rudder;
 pub mod signature;
 #[cfg(feature = "study")]
 pub mod separation;
+mod text;
 pub mod weak_form;

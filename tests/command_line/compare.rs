@@ -92,6 +92,27 @@ fn a_bad_log_is_named_and_the_rest_is_compared() {
 }
 
 #[test]
+fn a_figure_that_cannot_be_is_said_first_and_is_in_the_status() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pitot.csv");
+    let mut flight = fly(3, 40.0, REALISTIC);
+    // no unit has this factor, so that the log itself is not refused
+    flight.samples.iter_mut().for_each(|s| s.airspeed_mps *= 0.65);
+    csv::save(&flight, &path).unwrap();
+    let pitot = path.to_str().unwrap();
+    let of = |log: &str| greylag(&["--model", "params/x8/jsbsim.toml", "--log", log]);
+    let output = of(pitot);
+    let said = text(&output.stdout);
+    assert_eq!(output.status.code(), Some(3), "{said}{}", text(&output.stderr));
+    assert!(said.starts_with("pitot.csv: airspeed_scale is found at 0.6"), "{said}");
+    assert!(said.contains("nothing is said about forces and moments"), "{said}");
+    assert!(!said.contains("rolling moment"), "{said}");
+    assert!(said.contains("next: greylag logs info "), "{said}");
+    let sound = of(&log(folder.path(), "sound.csv", 3, 40.0));
+    assert_eq!(sound.status.code(), Some(0), "{}", text(&sound.stdout));
+}
+
+#[test]
 fn what_is_missing_is_asked_for() {
     let none = greylag(&["--model", "params/x8/prior.toml"]);
     assert!(!none.status.success() && text(&none.stderr).contains("--log"));

@@ -421,6 +421,10 @@ fn a_log_that_was_mistyped_does_not_spoil_the_folder() {
     files(folder);
     let line = "aircraft from-log @/own --mass-kg 3.364 --span-m 2.1 --area-m2 0.75 --tail flying-wing --log @/";
     assert!(!run(&format!("{line}god.csv"), folder).status.success());
+    // Ctrl-C while the logs are read leaves the prior; the same command goes on from it
+    let measures = "--mass-kg 3.364 --span-m 2.1 --area-m2 0.75 --tail flying-wing";
+    run(&format!("aircraft new @/own/prior --name own {measures}"), folder);
+    assert!(folder.join("own/prior/model.toml").exists());
     let again = run(&format!("{line}good.csv"), folder);
     assert!(folder.join("own/model.toml").exists(), "{}", answer(&again));
 }

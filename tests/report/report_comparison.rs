@@ -25,6 +25,7 @@ pub fn comparison(seconds: f64) -> Comparison {
         seed: 1,
         answer: answer(&models),
         sentences: models[0].sentences.clone(),
+        doubtful: Vec::new(),
         models,
         forecasts: vec![ForecastResult {
             name: "hold the state",

@@ -86,6 +86,27 @@ fn a_rudder_that_moves_is_said_first() {
 }
 
 #[test]
+fn a_figure_that_cannot_be_comes_first_and_withholds_the_channels() {
+    use greylag::sysid::flight_path::reconstruction::Nuisance;
+    let scale = |value: f64| {
+        let mut flights = exact().to_vec();
+        let name = "airspeed_scale".to_owned();
+        flights[1].nuisances = vec![Nuisance { name, value, sd: 0.01, unit: "", prior: None }];
+        against(&[model("prior-as-printed")], &flights)
+    };
+    let (sound, found) = (scale(1.05), scale(1.87));
+    let on_channels = |c: &Comparison| {
+        let said = c.sentences.join("\n").to_lowercase();
+        let regimes = c.models[0].channels.iter().map(|ch| ch.worst_regime.to_lowercase());
+        regimes.filter(|regime| said.contains(regime)).count()
+    };
+    assert!(sound.doubtful.is_empty() && on_channels(&sound) > 0, "{:?}", sound.sentences);
+    assert!(found.doubtful[0].starts_with("flight2.csv: airspeed_scale is found at 1.87"));
+    assert_eq!(found.sentences[..2], found.doubtful);
+    assert_eq!(on_channels(&found), 0, "{:?}", found.sentences);
+}
+
+#[test]
 fn validate_weak_form_of_the_exact_model() {
     let twin = one("jsbsim", exact());
     for id in [ChannelId::Lift, ChannelId::Roll, ChannelId::Pitch, ChannelId::Yaw] {

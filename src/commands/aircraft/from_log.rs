@@ -10,12 +10,15 @@ use super::check;
 use super::new::{self, Common};
 use crate::commands::files::{self, Overwrite};
 use crate::commands::intake::LogArguments;
-use crate::commands::terminal::print_next;
+use crate::commands::terminal::{NORMAL_95, print_next};
 use crate::commands::{Command, command_of, given};
 use crate::logs::quoted;
+use crate::sysid::amend::lifted;
 
 /// Largest ratio of standard deviation to magnitude at which a coefficient counts as determined.
 const KNOWN: f64 = 0.3;
+/// Largest ratio of standard deviation to the range of the bounds at which an offset about zero, such as Cl0, counts as determined.
+const OFFSET: f64 = 0.02;
 /// Prefixes of coefficient names, each with a manoeuvre that excites the coefficients with this prefix.
 const MANOEUVRES: [(&str, &str); 7] = [
     ("roll_linear", "aileron doublets, then bank to bank reversals"),
@@ -54,8 +57,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let measures = new::measures(common, folder, *span_m, *area_m2)?;
     let prior = folder.join("prior");
     let made = [folder, &prior].map(|path| !path.exists());
-    new::files(&prior, &measures.airframe(), &measures.model())?;
-    let model = prior.join("model.toml");
+    // Ctrl-C while the logs are read leaves the prior, with which the same command begins again
+    let left = prior.join("model.toml").exists();
+    let model = new::files_again(&prior, &measures.airframe(), &measures.model())?;
     let fitted = folder.join("model.toml");
     let mut line: Vec<OsString> =
         ["amend", "--from-scratch", "--tune-only", "--model"].map(Into::into).into();
@@ -67,7 +71,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     line.extend(["--report".into(), folder.join("fit.html").into_os_string()]);
     let Command::Amend(amend) = command_of(&line)? else { bail!("greylag amend cannot be run") };
     let status = crate::commands::amend::run(&amend).inspect_err(|_| {
-        remove(folder, &prior, made);
+        if !left {
+            remove(folder, &prior, made);
+        }
     })?;
     if !fitted.exists() {
         println!("the model estimated from the dimensions is in {}", prior.display());
@@ -119,9 +125,32 @@ fn next(folder: &Path, fitted: &Path, logs: &LogArguments) -> Result<()> {
             );
         }),
     }
+    if let Some(command) = lift(folder, &story, logs)? {
+        println!("to lift the bounds at which coefficients ended: {command}");
+    }
     println!("a flight that the fit has not seen judges the model: `greylag compare` with its log");
     print_next(&format!("greylag diagnose --model {}{}", quoted(fitted), logs.words()));
     Ok(())
+}
+
+/// The command that repeats the fit with the bounds lifted at which coefficients ended; `None` if none should be lifted.
+fn lift(folder: &Path, story: &serde_json::Value, logs: &LogArguments) -> Result<Option<String>> {
+    let prior = folder.join("prior/model.toml");
+    let model = given::model(&prior)?;
+    let all = story["parameters"].as_array().into_iter().flatten();
+    let ended = all.filter(|p| p["at_bound"].as_bool() == Some(true));
+    let range = |p: &serde_json::Value| lifted(&model, p["name"].as_str()?, p["value"].as_f64()?);
+    let bounds: Vec<String> = ended.filter_map(range).collect();
+    let command = || {
+        format!(
+            "greylag amend --from-scratch --tune-only --model {}{} --bound {} --out {}",
+            quoted(&prior),
+            logs.words(),
+            bounds.join(" "),
+            quoted(&folder.join("lifted"))
+        )
+    };
+    Ok((!bounds.is_empty()).then(command))
 }
 
 /// Names of the coefficients that the flights do not determine. JSON holds `null` for a standard deviation that is not
@@ -129,15 +158,65 @@ fn next(folder: &Path, fitted: &Path, logs: &LogArguments) -> Result<()> {
 fn unknown(story: &serde_json::Value) -> Vec<String> {
     let all = story["parameters"].as_array().into_iter().flatten();
     let unknown = all.filter(|p| match (p["value"].as_f64(), p["sd"].as_f64()) {
-        (Some(value), Some(sd)) => sd > KNOWN * value.abs(),
+        (Some(value), Some(sd)) => sd > KNOWN * value.abs() && !about_zero(p, value, sd),
         _ => true,
     });
     unknown.map(|p| p["name"].as_str().unwrap_or_default().to_owned()).collect()
 }
 
+/// Whether the flights show that the coefficient `p` is an offset of about zero. No ratio to such a value can be required.
+fn about_zero(p: &serde_json::Value, value: f64, sd: f64) -> bool {
+    let offset = p["name"].as_str().is_some_and(|name| name.ends_with('0'));
+    // the prior of a fit from scratch is as wide as the range of the bounds
+    let range = p["prior_sd"].as_f64().unwrap_or_default();
+    offset && value.abs() < NORMAL_95 * sd && sd <= OFFSET * range
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        logs: LogArguments,
+    }
+
+    #[test]
+    fn the_command_that_lifts_bounds_is_whole() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = root.path().join("own");
+        let size = ["--mass-kg", "3.4", "--span-m", "2.1", "--area-m2", "0.75", "--name", "own"];
+        let mut line: Vec<OsString> = ["aircraft", "new"].map(Into::into).into();
+        line.push(folder.join("prior").into_os_string());
+        line.extend(size.map(OsString::from));
+        crate::commands::run(command_of(&line).unwrap()).unwrap();
+        let logs = Line::parse_from(["greylag", "--log", "a.csv"]).logs;
+        let of = |name: &str, value: f64| {
+            let story = serde_json::json!({ "parameters": [
+                { "name": name, "value": value, "at_bound": true },
+                { "name": "drag_linear.CDq", "value": 5.0, "at_bound": false },
+            ] });
+            lift(&folder, &story, &logs).unwrap()
+        };
+        assert_eq!(of("side_force_linear.CYbeta", 0.5), None);
+        let command = of("drag_linear.CD0", 0.5).unwrap();
+        assert!(command.contains(" --bound drag_linear.CD0=0..1 --out "), "{command}");
+        let words: Vec<OsString> = command.split(' ').skip(1).map(OsString::from).collect();
+        assert!(matches!(command_of(&words), Ok(Command::Amend(_))), "{command}");
+    }
+
+    #[test]
+    fn an_offset_about_zero_is_known_by_its_own_scale() {
+        let story = |sd: f64| {
+            serde_json::json!({ "parameters": [
+                { "name": "roll_linear.Cl0", "value": 1e-5, "sd": sd, "prior_sd": 0.1 },
+            ] })
+        };
+        assert!(unknown(&story(1e-4)).is_empty());
+        assert_eq!(unknown(&story(1e-2)), ["roll_linear.Cl0"]);
+    }
 
     #[test]
     fn a_coefficient_without_a_standard_deviation_is_not_known() {
@@ -164,5 +243,29 @@ mod tests {
         assert!(crate::commands::run(command).is_err());
         let left = std::fs::read_dir(&prior).unwrap().map(|e| e.unwrap().file_name());
         assert_eq!(left.collect::<Vec<_>>(), ["notes.txt"]);
+    }
+
+    #[test]
+    fn what_an_interrupted_run_left_is_no_obstacle_and_an_edited_prior_is_one() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = root.path().join("own");
+        let error = |words: &[&str], folder: &Path, rest: &[&str]| {
+            let mut line: Vec<OsString> = words.iter().map(OsString::from).collect();
+            line.push(folder.into());
+            let size = ["--mass-kg", "3.4", "--span-m", "2.1", "--area-m2", "0.75"];
+            line.extend(size.iter().chain(rest).map(OsString::from));
+            crate::commands::run(command_of(&line).unwrap()).err().map(|e| format!("{e:#}"))
+        };
+        let prior = folder.join("prior");
+        assert_eq!(error(&["aircraft", "new"], &prior, &["--name", "own"]), None);
+        let again =
+            || error(&["aircraft", "from-log"], &folder, &["--log", "no-such-log.csv"]).unwrap();
+        let said = again();
+        assert!(said.contains("no-such-log.csv") && !said.contains("exists with"), "{said}");
+        let model = prior.join("model.toml");
+        let edited = std::fs::read_to_string(&model).unwrap() + "# mine\n";
+        std::fs::write(&model, &edited).unwrap();
+        assert!(again().contains("exists with other content"), "{}", again());
+        assert_eq!(std::fs::read_to_string(&model).unwrap(), edited);
     }
 }

@@ -127,6 +127,24 @@ pub fn files(folder: &Path, airframe: &str, model_text: &str) -> Result<PathBuf>
     Ok(model)
 }
 
+/// As [`files`], but a file that already has the same content is no error: an interrupted run of the same command has left it.
+pub fn files_again(folder: &Path, airframe: &str, model_text: &str) -> Result<PathBuf> {
+    let airframe = flown_level(airframe, model_text)?;
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    for (name, text) in [("airframe.toml", airframe.as_str()), ("model.toml", model_text)] {
+        let path = folder.join(name);
+        match std::fs::read_to_string(&path) {
+            Ok(there) if there == text => {}
+            _ if path.exists() => {
+                bail!("{} exists with other content; name another folder", path.display())
+            }
+            _ => files::write(&path, text, Overwrite::New)?,
+        }
+    }
+    Ok(folder.join("model.toml"))
+}
+
 /// Checks the mass and dimensions that the user gives, and adds the defaults.
 pub fn measures(arguments: &Common, folder: &Path, span_m: f64, area_m2: f64) -> Result<Measures> {
     let Common { mass_kg, travel_deg, .. } = *arguments;

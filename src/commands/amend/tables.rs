@@ -28,7 +28,8 @@ fn parameter_table(parameters: &[Parameter]) -> Table {
             (_, true) => "added",
             _ => "",
         };
-        let [low, high] = p.ci95;
+        // the standard deviation at a bound is that of a fit without bounds
+        let [low, high] = if p.at_bound { [f64::NAN; 2] } else { p.ci95 };
         let row =
             [p.name.clone(), before, number(p.value), number(low), number(high), remark.into()];
         table.add_row(row);

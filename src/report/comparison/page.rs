@@ -19,7 +19,8 @@ const OF_OTHERS: usize = 2;
 /// A curve of the error growth ends where fewer runs than this, or than a fifth of the runs, are long enough.
 const FEW: usize = 5;
 
-/// The page of `report`: first the answer, then the evidence for it.
+/// The page of `report`: first the answer, then the evidence for it. If an estimate is physically impossible, the page begins with it
+/// and shows no forces and moments.
 pub fn comparison_page(report: &ComparisonReport) -> Page {
     let c = report.comparison;
     let answer = c.answer.clone();
@@ -29,17 +30,23 @@ pub fn comparison_page(report: &ComparisonReport) -> Page {
     let leading = if c.models.len() == 1 { 0 } else { LEADING };
     let words = Figure::Findings(findings(c, leading));
     // the page of a single model begins with its failures, that of several models with their differences
+    let sound = c.doubtful.is_empty();
     let (first, later) = match c.models.len() {
+        _ if !sound => (vec![words, answer], Section::default()),
         0 | 1 => (vec![answer, words], Section::default()),
         _ => (vec![answer], Section::new("In words", "", vec![words])),
     };
     let mut sections = vec![Section::new("", "", first)];
-    let named = place::named(&c.answer.numbers.acts);
-    sections.push(Section::new("Unexplained", &unexplained_note(c), unexplained(c, &named)));
+    if sound {
+        let named = place::named(&c.answer.numbers.acts);
+        sections.push(Section::new("Unexplained", &unexplained_note(c), unexplained(c, &named)));
+    }
     sections.push(Section::new("Error growth", &growth_note(c), growth(c)));
     sections.push(later);
-    sections.push(regimes::regimes(c));
-    sections.push(regimes::maps(c));
+    if sound {
+        sections.push(regimes::regimes(c));
+        sections.push(regimes::maps(c));
+    }
     sections.extend(traces::section(c));
     sections.push(tables::summary(c).folded());
     sections.push(tables::baselines(c).folded());
@@ -58,7 +65,9 @@ pub(crate) fn short_section(c: &Comparison) -> Section {
         finding.link = None;
     }
     let mut figures = vec![Figure::Findings(found)];
-    figures.extend(unexplained(c, &[]));
+    if c.doubtful.is_empty() {
+        figures.extend(unexplained(c, &[]));
+    }
     figures.extend(growth(c));
     Section::new("Model against flight", UNEXPLAINED_NOTE, figures)
 }
@@ -95,14 +104,18 @@ pub(crate) fn channel_name(id: ChannelId) -> String {
     format!("{} {}", id.symbol(), id.name())
 }
 
-/// The sentences on all models, the worst channels first. The last model comes first, with the first `leading` of its sentences
+/// Physically impossible estimates, and the sentences on all models, the worst channels first. The last model comes first, with the first `leading` of its sentences
 /// prominent. With several models, each sentence begins with the name of its model.
 fn findings(c: &Comparison, leading: usize) -> Findings {
     let mut found = Findings::default();
+    let plain = |said: &String| Finding { sentence: said.clone(), link: None };
+    found.lead.extend(c.doubtful.iter().map(plain));
     let last = c.models.len().saturating_sub(1);
     for (k, model) in c.models.iter().enumerate().rev() {
         let own = if k == last { usize::MAX } else { OF_OTHERS };
-        for (i, said) in model.sentences_worst_first().into_iter().take(own).enumerate() {
+        let all = model.sentences_worst_first().into_iter();
+        let said_once = all.filter(|said| c.doubtful.iter().all(|first| first != said));
+        for (i, said) in said_once.take(own).enumerate() {
             let sentence = match last {
                 0 => said.into(),
                 _ => format!("{}: {said}", named(c, k)),

@@ -28,8 +28,11 @@ pub(crate) fn channel_of(c: &Comparison) -> Option<ChannelId> {
     acts.first().copied().or_else(|| c.models.first().and_then(worst))
 }
 
-/// Sentence for the page of the comparison `c`, see [`of_models`].
+/// Sentence for the page of the comparison `c`, see [`of_models`]. Empty if an estimate is physically impossible.
 pub(crate) fn of_comparison(c: &Comparison) -> String {
+    if !c.doubtful.is_empty() {
+        return String::new();
+    }
     of_models(&c.models, &c.answer.numbers.acts)
 }
 

@@ -15,7 +15,7 @@ use super::flight::Flight;
 use super::judge::{self, JUDGED_AT_S, Judge};
 use super::output_error::{Fit, FitOptions};
 use super::result::{Amendment, Settings};
-use super::{answer, parameters, story};
+use super::{answer, bounds, parameters, story};
 use crate::compare::{Answer, HorizonScore, forecast};
 use crate::diagnose::Candidate;
 use crate::flight_path::reconstruction::{Reconstruction, Segment};
@@ -301,7 +301,7 @@ fn notes(model: &GreyBox, tuned: &GreyBox, fit: &Fit) -> Vec<String> {
         ));
     }
     notes.extend(judge::contradictions(&fit.parameters));
-    notes.extend(judge::at_bounds(&fit.parameters));
+    notes.extend(bounds::at_bounds(&fit.model, &fit.parameters));
     notes.extend(judge::against_prior(&fit.parameters));
     notes
 }

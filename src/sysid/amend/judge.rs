@@ -227,34 +227,6 @@ pub fn objections(id: &str, parameters: &[Parameter]) -> Vec<String> {
     objections
 }
 
-/// Advice, in words, on coefficients of the model itself whose fitted value is at a bound.
-pub fn at_bounds(parameters: &[Parameter]) -> Vec<String> {
-    let ended = parameters.iter().filter(|p| p.at_bound && !p.added);
-    ended
-        .map(|p| {
-            let cure = match p.value == 0.0 {
-                true => format!(
-                    "the flights give the opposite sign or do not separate it from the rest; check the sign of that control in \
-                     the mapping, or hold {} by a smaller sd in the model file",
-                    p.name
-                ),
-                false => format!(
-                    "the others make up for what it lacks, and its interval is none; lift it with --bound {}={}",
-                    p.name,
-                    wider(p.value)
-                ),
-            };
-            format!("{} ends at its bound {}: {cure}", p.name, p.value)
-        })
-        .collect()
-}
-
-/// The range from −2 to +2 times the magnitude of `bound`, in the syntax of the option `--bound`.
-fn wider(bound: f64) -> String {
-    let far = 2.0 * bound.abs();
-    format!("-{far}..{far}")
-}
-
 /// Notes on coefficients of the model itself whose fitted sign is opposite to that in the model file. The value must differ
 /// from zero by 1.96 of its standard deviations, and from the file by more than the standard deviation in the file.
 pub fn against_prior(parameters: &[Parameter]) -> Vec<String> {

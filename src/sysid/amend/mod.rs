@@ -6,6 +6,7 @@
 
 mod amendment;
 mod answer;
+mod bounds;
 mod conventions;
 mod derivatives;
 pub mod document;
@@ -29,6 +30,7 @@ mod story;
 
 pub use amendment::{Added, Amended, Options, Prior, Refused, amend, split};
 pub use answer::{Diagnosed, Origin, diagnosed};
+pub use bounds::lifted;
 pub use conventions::{Convention, Tried};
 pub use error::AmendError;
 pub use flight::Flight;

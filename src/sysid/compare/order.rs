@@ -32,6 +32,12 @@ impl ModelResult {
         let ordered: Vec<Option<&str>> = self.sentences.iter().map(next).collect();
         ordered.into_iter().zip(&self.sentences).map(|(o, s)| o.unwrap_or(s)).collect()
     }
+
+    /// Removes the sentences on channels, for flights whose forces and moments cannot be trusted.
+    pub(super) fn withhold_channels(&mut self) {
+        let ModelResult { sentences, channels, .. } = self;
+        sentences.retain(|said| !channels.iter().any(|c| states(c, said)));
+    }
 }
 
 /// Whether the sentence `said` is on the channel `c`.

@@ -24,6 +24,8 @@ pub struct Comparison {
     pub answer: Answer,
     /// Findings on the first model in sentences, in descending order of importance.
     pub sentences: Vec<String>,
+    /// Physically impossible estimates, in words, and what follows. If there are any, no sentence is on a channel.
+    pub doubtful: Vec<String>,
     /// The models, in the order of the command line.
     pub models: Vec<ModelResult>,
     /// Free-run errors of baseline forecasts without aerodynamics.

@@ -19,7 +19,7 @@ use super::result::{
     RegimeBins, Settings,
 };
 use super::sentence::{NOTHING_LEFT, Subject, sentence};
-use super::usable::{self, Usable, usable};
+use super::usable::{self, Said, Usable, usable};
 use super::verdict;
 use crate::flight_path::reconstruction::Reconstruction;
 use crate::per_flight::known::KnownFlight;
@@ -36,6 +36,9 @@ const UNMOVED: &str = "these flights do not move it above the sensors' noise";
 const NOISE_UNKNOWN: &str =
     "its noise cannot be computed, because the model predicts no number beside a measured state";
 const DOUBTFUL: &str = "the uncertainty of the sensor errors may explain the whole residual";
+/// Sentence that follows physically impossible estimates.
+const CANNOT_BE: &str = "A figure of these flights cannot be, so nothing is said about forces and moments, and the errors of free \
+                         runs are not to be trusted.";
 
 /// Options of a comparison.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,11 +97,14 @@ fn slowest(models: &[GreyBox], options: &Options) -> Result<f64, CompareError> {
 fn compared(
     models: &[GreyBox],
     flights: &[Reconstruction],
-    (used, prepared, mut notes): Usable,
+    (used, prepared, Said { mut notes, mut doubtful }): Usable,
     options: &Options,
     progress: &Progress,
 ) -> Result<Comparison, CompareError> {
     let first = models.first().ok_or(CompareError::NoModel)?;
+    if !doubtful.is_empty() {
+        doubtful.push(CANNOT_BE.into());
+    }
     notes.extend(short_of(&prepared, &options.horizons_s));
     let steps: Vec<(&str, f64)> = prepared.iter().map(|f| (f.name.as_str(), f.dt)).collect();
     notes.extend(free_run::uneven(&steps, &options.horizons_s));
@@ -114,6 +120,10 @@ fn compared(
             result.sentences.extend(verdict::beaten(&result.free_run, &forecasts));
             let rudder = rudder::unmodelled(flights, model).map(rudder::warning);
             result.sentences.splice(0..0, rudder);
+            if !doubtful.is_empty() {
+                result.withhold_channels();
+                result.sentences.splice(0..0, doubtful.iter().cloned());
+            }
             Ok(result)
         })
         .collect::<Result<Vec<_>, CompareError>>()?;
@@ -123,6 +133,7 @@ fn compared(
         program: concat!("greylag ", env!("CARGO_PKG_VERSION")).into(),
         seed: options.seed,
         sentences: models[0].sentences.clone(),
+        doubtful,
         models,
         forecasts,
         flights: prepared.iter().zip(used).map(|(p, from)| flight::result(p, from)).collect(),

@@ -1,26 +1,36 @@
 //! The flights that can be compared with models, and notes on the others.
 
 use super::CompareError;
+use crate::flight_path::impossible;
 use crate::flight_path::reconstruction::Reconstruction;
 use crate::weak_form::kernel::KERNEL_S;
 use crate::weak_form::prepared::Prepared;
 
-/// The flights that can be compared, the same prepared, and notes.
-pub(super) type Usable<'a> = (Vec<&'a Reconstruction>, Vec<Prepared>, Vec<String>);
+/// What the flights of a comparison show before any model is used.
+#[derive(Default)]
+pub(super) struct Said {
+    /// Reasons for which flights cannot be compared, and what is missing in the others.
+    pub notes: Vec<String>,
+    /// Physically impossible estimates in the flights that can be compared.
+    pub doubtful: Vec<String>,
+}
+
+/// The flights that can be compared, the same prepared, and what is said about them.
+pub(super) type Usable<'a> = (Vec<&'a Reconstruction>, Vec<Prepared>, Said);
 /// The same with the indices of the flights that can be compared.
-pub(super) type Emptied = (Vec<usize>, Vec<Prepared>, Vec<String>);
+pub(super) type Emptied = (Vec<usize>, Vec<Prepared>, Said);
 
 /// The flights that can be compared, and notes on the others. An aircraft counts as flying above the airspeed `slowest` (m/s).
 pub(super) fn usable(flights: &[Reconstruction], slowest: f64) -> Result<Usable<'_>, CompareError> {
-    let (mut used, mut prepared, mut notes) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut used, mut prepared, mut said) = (Vec::new(), Vec::new(), Said::default());
     for flight in flights {
-        if let Some(ready) = ready(flight, slowest, &mut notes)? {
+        if let Some(ready) = ready(flight, slowest, &mut said)? {
             used.push(flight);
             prepared.push(ready);
         }
     }
-    some(flights, &prepared, &notes)?;
-    Ok((used, prepared, notes))
+    some(flights, &prepared, &said.notes)?;
+    Ok((used, prepared, said))
 }
 
 /// As [`usable`], but all of `flights` lose their segments, each once it is prepared.
@@ -28,16 +38,16 @@ pub(super) fn emptied(
     flights: &mut [Reconstruction],
     slowest: f64,
 ) -> Result<Emptied, CompareError> {
-    let (mut places, mut prepared, mut notes) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut places, mut prepared, mut said) = (Vec::new(), Vec::new(), Said::default());
     for (place, flight) in flights.iter_mut().enumerate() {
-        if let Some(ready) = ready(flight, slowest, &mut notes)? {
+        if let Some(ready) = ready(flight, slowest, &mut said)? {
             places.push(place);
             prepared.push(ready);
         }
         flight.segments = Vec::new();
     }
-    some(flights, &prepared, &notes)?;
-    Ok((places, prepared, notes))
+    some(flights, &prepared, &said.notes)?;
+    Ok((places, prepared, said))
 }
 
 /// An error if there is no flight, or none that can be compared.
@@ -53,13 +63,15 @@ fn some(
     }
 }
 
-/// The flight prepared for a comparison; `None` if it cannot be compared. The reason, or what is missing, is added to `notes`.
+/// The flight prepared for a comparison; `None` if it cannot be compared. The reason, what is missing and what is impossible in the
+/// flight are added to `said`.
 fn ready(
     flight: &Reconstruction,
     slowest: f64,
-    notes: &mut Vec<String>,
+    said: &mut Said,
 ) -> Result<Option<Prepared>, CompareError> {
     let ready = Prepared::new(flight, slowest)?;
+    let notes = &mut said.notes;
     if ready.windows.is_empty() {
         notes.push(why_unusable(flight, slowest));
         return Ok(None);
@@ -76,6 +88,7 @@ fn ready(
             flight.name
         ));
     }
+    said.doubtful.extend(impossible::of_flight(flight));
     Ok(Some(ready))
 }
 

@@ -3,6 +3,7 @@
 //!
 //! It uses only kinematic equations, which contain no aerodynamics. No aerodynamic model of the aircraft is therefore needed.
 
+pub mod impossible;
 pub mod installation;
 pub mod measurement_effects;
 pub mod reconstruction;

@@ -4,9 +4,9 @@
 //! statistic. A candidate whose evidence exceeds its threshold may be asserted as missing in the model.
 
 use crate::diagnose::answer::result::{Advice, Candidate, ChannelLeft, Verdict};
-use crate::diagnose::answer::sentences::figures;
 use crate::diagnose::search::stepwise::Found;
 use crate::per_flight::askew;
+use crate::text::figures;
 use greylag_physics::catalogue::describe;
 
 /// Largest number of recommendations for candidates whose evidence is not far below the threshold.

@@ -8,9 +8,10 @@ use std::collections::HashSet;
 use nalgebra::DMatrix;
 
 use crate::diagnose::answer::result::{FlightTrim, Measurement};
-use crate::diagnose::answer::sentences::{INTERVAL, figures};
+use crate::diagnose::answer::sentences::INTERVAL;
 use crate::diagnose::search::round::Round;
 use crate::per_flight::{Constant, askew};
+use crate::text::figures;
 use greylag_num::statistics::correlation_length;
 
 /// A constant is significant if it differs from its reference by more than this number of standard deviations. The reference is

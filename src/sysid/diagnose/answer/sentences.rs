@@ -11,6 +11,7 @@ use crate::diagnose::options::Options;
 use crate::diagnose::regression::sensors::BLUR;
 use crate::diagnose::search::stepwise::Found;
 use crate::per_flight::askew;
+use crate::text::{figures, with_interval};
 use greylag_model::GreyBox;
 use greylag_physics::catalogue::describe;
 use greylag_physics::inputs::{Kind, MOST};
@@ -152,11 +153,6 @@ fn sensors(measurement: &[Measurement]) -> Vec<String> {
     flights.into_iter().map(one).collect()
 }
 
-/// A value with the half width of its 95 % interval and its unit, as text.
-pub fn with_interval(value: f64, sd: f64, unit: &str) -> String {
-    format!("{} ± {} {unit}", figures(value), figures(INTERVAL * sd)).trim_end().to_owned()
-}
-
 /// The parameters with their 95 % intervals, in words.
 pub fn values(c: &Candidate) -> String {
     let of = |p: &Parameter| {
@@ -217,15 +213,6 @@ fn alike(others: &[String], separate: &str) -> String {
         " It could also be {}: these data cannot tell them apart{decides}.",
         others.join(" or ")
     )
-}
-
-/// `x` to three significant figures.
-pub fn figures(x: f64) -> String {
-    if x == 0.0 || !x.is_finite() {
-        return format!("{x}");
-    }
-    let places = (2 - x.abs().log10().floor() as i32).clamp(0, 9) as usize;
-    format!("{x:.places$}")
 }
 
 /// Notes on coefficients and sensor errors far from their prior values, on what a flexible model could remove, on constants

@@ -8,7 +8,7 @@ use super::free::grammar::MOST_NODES;
 use super::grades;
 use super::library;
 use super::result::{HeldOut, Proposal};
-use crate::diagnose::answer::sentences::figures;
+use crate::text::figures;
 use greylag_physics::formula::Variable;
 
 /// `text` with an upper-case first letter and a full stop.
