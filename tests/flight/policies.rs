@@ -111,6 +111,20 @@ fn a_turn_near_the_largest_bank_is_held() {
 }
 
 #[test]
+fn a_wrong_vane_and_a_blocked_pitot_tube_are_not_followed() {
+    // found by searches: the limiter followed the vane out of the envelope, and the nose went up or down by 20 degrees and more
+    let damped = companion_with(ControllerKind::LqiDamped, &x8(), Path::new(POLICY)).unwrap();
+    let factory = CompanionFactory::new(damped, &x8()).unwrap();
+    for scenario in [
+        include_str!("../data/scenarios/wrong-vane.json"),
+        include_str!("../data/scenarios/blocked-airspeed.json"),
+    ] {
+        let scenario: Scenario = serde_json::from_str(scenario).unwrap();
+        assert_eq!(broken(&factory, &scenario), [""; 0], "{:?}", scenario.faults);
+    }
+}
+
+#[test]
 fn turbulence_is_no_oscillation() {
     let factory = CompanionFactory::new(lqi(), &x8()).unwrap();
     let swings =
