@@ -35,6 +35,10 @@ fn is_zero(x: &f64) -> bool {
     *x == 0.0
 }
 
+/// A quarter of a turn, rad, with the digits of a mapping file.
+#[expect(clippy::approx_constant, reason = "the user reads it in a mapping line")]
+pub(crate) const QUARTER_TURN: f64 = 1.5708;
+
 /// Groups of columns with a common unit. A finding about a wrong unit names the first column of its group.
 const ALIKE: [[&str; 3]; 3] = [
     ["roll_rad", "pitch_rad", "yaw_rad"],
@@ -212,7 +216,7 @@ mod tests {
 
     #[test]
     fn each_choice_has_the_field_of_the_log() {
-        let yaw = Cure { offset: 1.5708, ..Cure::factor("yaw_rad", -1.0) };
+        let yaw = Cure { offset: QUARTER_TURN, ..Cure::factor("yaw_rad", -1.0) };
         let choices = vec![yaw, Cure::factor("r_radps", -1.0)];
         let lines: Vec<String> = choices.iter().map(Cure::line).collect();
         let found = Finding { choices, ..Finding::problem(lines.join(", or ")) };

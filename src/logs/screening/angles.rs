@@ -8,7 +8,7 @@ use super::relation::{
 };
 use super::{cured, cured_by, undecided};
 use crate::Sample;
-use crate::finding::{Cure, Finding};
+use crate::finding::{Cure, Finding, QUARTER_TURN};
 
 const DEGREE: f64 = PI / 180.0;
 /// Window over which angles and rates are compared, s.
@@ -111,7 +111,7 @@ fn signs(rows: &[Sample], windows: &[&[Sample]]) -> Vec<Finding> {
 /// The finding that yaw falls while r is positive. `bank` is the correlation of r with the bank angle, by which the wrong one of
 /// the two is known.
 fn yaw_turned(bank: Option<f64>) -> Finding {
-    let yaw = Cure { offset: 1.5708, ..Cure::factor("yaw_rad", -1.0) };
+    let yaw = Cure { offset: QUARTER_TURN, ..Cure::factor("yaw_rad", -1.0) };
     let from_east = "yaw looks counted from east to the left (ENU), while the log format counts from north to the right (NED)";
     let left =
         "r_radps looks positive to the left, while the log format's is positive to the right";
@@ -156,7 +156,7 @@ mod tests {
     #[test]
     fn the_bank_decides_between_yaw_and_its_rate() {
         let [yaw, rate] = [0.9, -0.9].map(|bank| yaw_turned(Some(bank)));
-        assert_eq!(yaw.cure, Some(Cure { offset: 1.5708, ..Cure::factor("yaw_rad", -1.0) }));
+        assert_eq!(yaw.cure, Some(Cure { offset: QUARTER_TURN, ..Cure::factor("yaw_rad", -1.0) }));
         assert_eq!(rate.cure, Some(Cure::factor("r_radps", -1.0)));
         let open = yaw_turned(None);
         assert!(open.cure.is_none() && open.corrects("yaw_rad") && open.corrects("r_radps"));
