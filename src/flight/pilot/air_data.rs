@@ -311,7 +311,7 @@ mod tests {
             |frame| frame.faults.insert(Faults::SPECIFIC_FORCE),
         ];
         for change in wrong {
-            let found = level.fly(3.0, |frame| change(frame));
+            let found = level.fly(3.0, change);
             assert!(level.changes().is_empty() && level.error(found).is_finite());
         }
         // an upward gust of 3.5 m/s: vane and lift rise together, attitude and velocity do not
