@@ -141,8 +141,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let kept = given_is_kept(arguments, story).filter(|_| !all_refused);
     let answer = amended.amendment.answer.clone().then(next(&arguments.logs.among(&used), &places));
     // the page is drawn before any file is written, so that Ctrl-C during the drawing leaves no file behind
-    let told = (&places, &answer);
-    let draw = || page(arguments, &model, &amended, &tests, told, &part(&on_stage, drawing));
+    let results = (&places, &answer);
+    let draw = || page(arguments, &model, &amended, &tests, results, &part(&on_stage, drawing));
     let drawn = match &arguments.report {
         Some(path) if !all_refused && kept.is_none() => Some((path, draw()?)),
         _ => None,

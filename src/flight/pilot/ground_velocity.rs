@@ -2,6 +2,7 @@
 
 use greylag_link::vehicle::Telemetry;
 use greylag_physics::Time;
+use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::rigid_body::body_to_horizon;
 
 /// Age up to which a velocity over ground is carried on by the accelerometers, s. Velocities come ten times a second, states a
@@ -9,7 +10,6 @@ use greylag_physics::rigid_body::body_to_horizon;
 const CARRIED_S: f64 = 0.5;
 /// An older velocity counts only if the accelerometers say that it has changed by less than this, m/s.
 const UNCHANGED_MPS: f64 = 1.0;
-const GRAVITY: f64 = 9.80665;
 
 /// Velocity over ground between its messages.
 #[derive(Clone, Copy, Debug, Default)]
@@ -30,7 +30,7 @@ impl GroundVelocity {
         };
         let [x, y, z] = body_to_horizon(&frame.state, frame.specific_force);
         let (sin, cos) = frame.yaw.sin_cos();
-        let acceleration = [cos * x - sin * y, sin * x + cos * y, z + GRAVITY];
+        let acceleration = [cos * x - sin * y, sin * x + cos * y, z + STANDARD_GRAVITY];
         let carried: [f64; 3] = std::array::from_fn(|i| carried[i] + passed * acceleration[i]);
         self.last = Some((frame.time, since, message, carried));
         let off = (0..3).map(|i| (carried[i] - message[i]).powi(2)).sum::<f64>().sqrt();
@@ -73,7 +73,7 @@ mod tests {
         let mut velocity = GroundVelocity::default();
         // 1 m/s² ahead and 0.5 m/s² upwards
         let at = |velocity: &mut GroundVelocity, k| {
-            velocity.at(&frame(k, 0.0, [1.0, 0.0, -GRAVITY - 0.5]))
+            velocity.at(&frame(k, 0.0, [1.0, 0.0, -STANDARD_GRAVITY - 0.5]))
         };
         let mut last = None;
         for k in 0..=50 {
@@ -92,7 +92,7 @@ mod tests {
     fn a_velocity_that_does_not_change_stays_valid() {
         let mut velocity = GroundVelocity::default();
         let pitch = 0.05f64;
-        let force = [GRAVITY * pitch.sin(), 0.0, -GRAVITY * pitch.cos()];
+        let force = [STANDARD_GRAVITY * pitch.sin(), 0.0, -STANDARD_GRAVITY * pitch.cos()];
         for k in 0..1000 {
             assert!(velocity.at(&frame(k, pitch, force)).is_some());
         }

@@ -4,7 +4,7 @@ use greylag_link::vehicle::limits;
 use greylag_link::vehicle::{Faults, Telemetry};
 
 /// Faults that make a frame unusable for control, with their names. A fault of the specific force is not among them, because
-/// control does not use the specific force.
+/// without it only the checks and corrections by the lift are left out.
 const STATE_FAULTS: [(Faults, &str); 6] = [
     (Faults::ATTITUDE, "attitude"),
     (Faults::RATES, "body rates"),

@@ -21,12 +21,12 @@ pub fn at_bounds(model: &GreyBox, parameters: &[Parameter]) -> Vec<String> {
         let (bound, cure) = cure(model, &p.name, p.value)?;
         let advice = match cure {
             Cure::Zero => format!(
-                "the flights give the opposite sign or do not separate it from the rest; check the sign of that control in \
+                "the flights give the opposite sign or do not determine it apart from other coefficients; check the sign of that control in \
                  the mapping, or hold {} by a smaller sd in the model file",
                 p.name
             ),
-            Cure::WrongSign => "a sign that it hardly has on an aircraft. The data are wrong or do not separate it from the \
-                                rest; check signs and units of the logs' columns"
+            Cure::WrongSign => "a sign that it hardly has on an aircraft. The data are wrong or do not determine it apart from \
+                                other coefficients; check signs and units of the logs' columns"
                 .into(),
             Cure::Lift(range) => format!(
                 "the others make up for what it lacks, and it has no interval; `greylag amend --bound {range}` lifts it"
