@@ -21,7 +21,7 @@ use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::report::ComparisonReport;
 #[cfg(feature = "study")]
-use crate::sysid::amend::Origin;
+use crate::sysid::amend::{Origin, document::STORY};
 use crate::sysid::compare::answer::multiple;
 use crate::sysid::compare::{
     Answer, Comparison, HorizonScore, ModelResult, Options, compare, compare_and_drop,
@@ -126,7 +126,20 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 /// The files that the command reads.
 fn inputs(arguments: &Arguments) -> Vec<PathBuf> {
     let models = arguments.models.iter().flat_map(|path| given::files(path));
-    models.chain(arguments.logs.files().cloned()).collect()
+    models.chain(arguments.logs.files().cloned()).chain(story(arguments)).collect()
+}
+
+/// The result of the amendment beside the second of two models, if there is one.
+#[cfg(feature = "study")]
+fn story(arguments: &Arguments) -> Option<PathBuf> {
+    let [_, after] = &arguments.models[..] else { return None };
+    Some(files::shipped(after).with_file_name(STORY)).filter(|path| path.exists())
+}
+
+/// `None`: a build without the feature `study` cannot read the files of an amendment.
+#[cfg(not(feature = "study"))]
+fn story(_: &Arguments) -> Option<PathBuf> {
+    None
 }
 
 /// The comparison of `models` with `flights`, and the flights if they are needed after it.

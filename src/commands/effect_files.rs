@@ -59,23 +59,15 @@ pub fn file_words(effects: &[String]) -> Result<BTreeMap<String, String>> {
 
 /// Paths of the `.toml` files in `folder`. They begin with `named`, the path of the folder as the user wrote it.
 fn folder_files(named: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder)? {
-        let file = named.join(entry?.file_name());
-        if file.extension().is_some_and(|e| e == "toml") {
-            files.push(file);
-        }
-    }
-    files.sort();
-    Ok(files)
+    let below = |file: PathBuf| named.join(file.file_name().unwrap_or_default());
+    Ok(register::files(folder)?.into_iter().map(below).collect())
 }
 
 /// Paths of the effect files that `effects` names, alone or by their folder. A folder that cannot be read is left to
 /// [`named_effects`].
 pub fn effect_paths(effects: &[String]) -> Vec<PathBuf> {
     let of = |named: &String| match shipped(Path::new(named)) {
-        folder if folder.is_dir() => folder_files(&folder, &folder).unwrap_or_default(),
-        file if is_file(named) => vec![file],
+        path if is_file(named) || path.is_dir() => register::files(&path).unwrap_or_default(),
         _ => Vec::new(),
     };
     effects.iter().flat_map(of).collect()

@@ -24,6 +24,7 @@ use crate::commands::terminal::print_next;
 use crate::commands::{bar, choices, controllers, fly, given, outputs};
 use crate::control::cem::Change;
 use crate::control::envelope::Guarded;
+use crate::control::policy::Agent;
 use crate::control::quality::Limits;
 use crate::control::{Controller, ControllerKind, Needs, Source, Target, build};
 use crate::model::GreyBox;
@@ -164,9 +165,7 @@ struct Document<'a> {
 /// Flies and scores the controllers, prints the tables, and writes JSON and page.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
-    let models = arguments.models.iter().chain(&arguments.of_any.beside);
-    let inputs = models.flat_map(|path| given::files(path)).chain([arguments.targets.clone()]);
-    outputs::check(arguments.json.iter().chain(&arguments.report), inputs, overwrite)?;
+    outputs::check(arguments.json.iter().chain(&arguments.report), inputs(arguments), overwrite)?;
     controllers::check_changes(&arguments.controllers, &arguments.changes)?;
     if let Some(count) = arguments.any {
         return any::fly(arguments, count);
@@ -214,6 +213,18 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         files::write(path, &page(arguments, &evaluations, &flights, then), overwrite)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The files that the command reads.
+fn inputs(arguments: &Arguments) -> Vec<PathBuf> {
+    let Arguments { models, policies, targets, of_any, .. } = arguments;
+    let models = models.iter().chain(&of_any.beside).flat_map(|path| given::files(path));
+    let policies = policies.iter().flat_map(|folder| Agent::files(&shipped(folder)));
+    let named = [targets, &of_any.population].map(|path| shipped(path));
+    let plant = arguments.plant.options(arguments.seed);
+    let name = &plant.aircraft;
+    let aircraft = plant.aircraft_dir.map(|folder| folder.join(name).join(format!("{name}.xml")));
+    models.chain(policies).chain(named).chain(aircraft).collect()
 }
 
 /// Commanded roll and pitch, degrees, in Figures 7 to 9 of the paper \[GSFM26\] (see `src/lib.rs`).

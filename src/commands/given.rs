@@ -9,6 +9,7 @@ use anyhow::{Result, bail};
 use super::files::shipped;
 use crate::logs::Format;
 use crate::model::GreyBox;
+use crate::physics::formula::register;
 
 /// Number of bytes that are read from the start of a file to identify its format.
 const HEAD: u64 = 4096;
@@ -28,7 +29,8 @@ pub fn model(path: &Path) -> Result<GreyBox> {
     Ok(GreyBox::load(&found)?)
 }
 
-/// The model file at `path`, and the airframe and the learned residual that it names.
+/// All files that are read with the model at `path`: the model file, and the airframe, the learned residual and the effect files
+/// that it names. A folder of effect files stands for its files.
 pub fn files(path: &Path) -> Vec<PathBuf> {
     let path = shipped(path);
     // a log given as a model can be large
@@ -36,7 +38,10 @@ pub fn files(path: &Path) -> Vec<PathBuf> {
     let table: toml::Table = text.and_then(|text| toml::from_str(&text).ok()).unwrap_or_default();
     let folder = path.parent().unwrap_or(Path::new(""));
     let named = ["airframe", "residual"].into_iter().filter_map(|key| table.get(key)?.as_str());
-    let named: Vec<PathBuf> = named.map(|name| folder.join(name)).collect();
+    let effects = table.get("effect_files").and_then(|value| value.as_array());
+    let effects = effects.into_iter().flatten().filter_map(|value| value.as_str());
+    let effects = effects.flat_map(|name| register::files(&folder.join(name)).unwrap_or_default());
+    let named: Vec<PathBuf> = named.map(|name| folder.join(name)).chain(effects).collect();
     [vec![path], named].concat()
 }
 
@@ -65,4 +70,32 @@ fn is_log(path: &Path) -> bool {
     // a text that starts like a comment or like JSON is no log, although its commas make it look like CSV
     let other = matches!(head.first(), Some(b'#' | b'{' | b'['));
     read.is_ok() && !other && Format::of(&head).is_some()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_files_of_a_model_are_all_that_it_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::create_dir(at("effects")).unwrap();
+        for name in ["effects/b.toml", "effects/a.toml", "effects/notes.txt"] {
+            std::fs::write(at(name), "").unwrap();
+        }
+        let text = r#"
+airframe = "airframe.toml"
+residual = "residual.safetensors"
+effect_files = ["own.toml", "effects"]
+"#;
+        std::fs::write(at("model.toml"), text).unwrap();
+        let named = ["airframe.toml", "residual.safetensors", "own.toml"];
+        let expected = [&["model.toml"][..], &named, &["effects/a.toml", "effects/b.toml"]];
+        assert_eq!(
+            files(&at("model.toml")),
+            expected.concat().into_iter().map(at).collect::<Vec<_>>()
+        );
+        assert_eq!(files(&at("none.toml")), [at("none.toml")]);
+    }
 }

@@ -121,7 +121,8 @@ impl Reading {
     /// All files that are read with the log `input`: itself, the mapping, the airframe and the files of `model`.
     fn files(&self, input: &Path, model: Option<&PathBuf>) -> Vec<PathBuf> {
         let model = model.map_or_else(Vec::new, |path| given::files(path));
-        let named = self.mapping.iter().chain(&self.airframe).cloned();
+        let airframe = self.airframe.as_deref().map(files::shipped);
+        let named = self.mapping.iter().cloned().chain(airframe);
         model.into_iter().chain(named).chain([input.to_owned()]).collect()
     }
 }

@@ -75,7 +75,7 @@ const FILES: [Mistake; 22] = [
     ),
 ];
 
-const KEPT: [Mistake; 17] = [
+const KEPT: [Mistake; 23] = [
     (
         "compare --model @/model.toml --log @/good.csv --json @/there.json",
         1,
@@ -134,6 +134,36 @@ const KEPT: [Mistake; 17] = [
         "evaluate --controller lqi --model @/model.toml --report @/model.toml --force",
         1,
         &["model.toml is an input"],
+    ),
+    (
+        "compare --model @/with-effect.toml --log @/good.csv --json @/own.toml --force",
+        1,
+        &["own.toml is an input"],
+    ),
+    (
+        "diagnose --model @/with-effect.toml --log @/good.csv --report @/effects/other.toml --force",
+        1,
+        &["other.toml is an input"],
+    ),
+    (
+        "compare --model @/model.toml @/story/model.toml --log @/good.csv --json @/story/amend.json --force",
+        1,
+        &["amend.json is an input"],
+    ),
+    (
+        "evaluate --controller policy --policy @/policy --json @/policy/actor.safetensors --force",
+        1,
+        &["actor.safetensors is an input"],
+    ),
+    (
+        "evaluate --controller lqi --aircraft plane --aircraft-dir @ --report @/plane/plane.xml --force",
+        1,
+        &["plane.xml is an input"],
+    ),
+    (
+        "campaign report @/campaign.toml --report @/campaign.toml --force",
+        1,
+        &["campaign.toml is an input"],
     ),
     ("aircraft new @ --mass-kg 2.1 --span-m 1.6 --area-m2 0.3", 1, &["exists"]),
     ("mystery --seed 3 --out @", 1, &["exists", "another folder"]),
@@ -238,8 +268,24 @@ fn files(folder: &Path) {
     fs::write(at("typo.toml"), model.replacen("schema = 1", "schema == 1", 1)).unwrap();
     fs::write(at("model.toml"), &model).unwrap();
     fs::copy("params/x8/airframe.toml", at("airframe.toml")).unwrap();
-    fs::create_dir(at("alone")).unwrap();
+    let effects = "schema = 1\neffect_files = [\"own.toml\", \"effects\"]";
+    fs::write(at("with-effect.toml"), model.replacen("schema = 1", effects, 1)).unwrap();
+    for name in ["alone", "effects", "story", "policy", "plane"] {
+        fs::create_dir(at(name)).unwrap();
+    }
     fs::write(at("alone/model.toml"), &model).unwrap();
+    fs::write(at("story/model.toml"), &model).unwrap();
+    let mine = [
+        "own.toml",
+        "effects/other.toml",
+        "story/amend.json",
+        "policy/actor.safetensors",
+        "plane/plane.xml",
+        "campaign.toml",
+    ];
+    for name in mine {
+        fs::write(at(name), "mine").unwrap();
+    }
     fs::create_dir(at("mystery")).unwrap();
     fs::write(at("mystery/answer.sealed"), "7b7d").unwrap();
 }

@@ -128,6 +128,25 @@ fn what_is_missing_is_said() {
 }
 
 #[test]
+fn the_files_of_the_prior_are_no_outputs() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let (model, own) = (at("model.toml"), folder.path().display().to_string());
+    let text = std::fs::read_to_string(param("prior.toml")).unwrap();
+    std::fs::write(&model, &text).unwrap();
+    std::fs::copy(param("airframe.toml"), at("airframe.toml")).unwrap();
+    for line in [
+        &["dynamics", "--prior", &model, "--collect", &own, "--out", &own][..],
+        &["residual", "--model", &model, "--log", &at("a.csv"), "--out", &own, "--force"],
+    ] {
+        let refused = greylag(&[&["train"][..], line].concat());
+        assert_eq!(refused.status.code(), Some(1), "{line:?}: {}", said(&refused));
+        assert!(said(&refused).contains("model.toml is an input"), "{}", said(&refused));
+    }
+    assert_eq!(std::fs::read_to_string(&model).unwrap(), text);
+}
+
+#[test]
 fn a_linear_residual_is_written_where_it_helps() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).display().to_string();

@@ -8,7 +8,8 @@ use anyhow::{Result, bail};
 
 use super::Which;
 use crate::campaign::gather::{Gathered, Joined, gather, read_lines, write_lines};
-use crate::commands::files::{self, Overwrite};
+use crate::commands::files::{self, Overwrite, shipped};
+use crate::commands::outputs;
 use crate::commands::status::IN_DOUBT;
 
 /// Largest number of cells that are listed by name. Further cells are only counted.
@@ -41,8 +42,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         if files::is_stdout(Some(path)) {
             bail!("--results and --times name files; standard output holds the list of the cells");
         }
-        files::writable(path, overwrite)?;
     }
+    let inputs = arguments.join.iter().cloned().chain([shipped(&arguments.which.file)]);
+    outputs::check(arguments.results.iter().chain(&arguments.times), inputs, overwrite)?;
     let (plan, store) = arguments.which.open()?;
     let mut all = gather(&plan, &store)?;
     println!(

@@ -12,7 +12,7 @@ use super::Which;
 use crate::campaign::gather::{gather, read_lines};
 use crate::campaign::tables::{Finding, Summary, findings, said, summaries};
 use crate::campaign::{Plan, Record, Store};
-use crate::commands::files::{self, Overwrite};
+use crate::commands::files::{self, Overwrite, shipped};
 use crate::commands::outputs;
 use crate::commands::status::IN_DOUBT;
 use crate::report::CampaignReport;
@@ -40,7 +40,8 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite: Overwrite = arguments.force.into();
     let written = arguments.report.iter().chain(&arguments.tables);
-    outputs::check(written, &arguments.results, overwrite)?;
+    let inputs = arguments.results.iter().cloned().chain([shipped(&arguments.which.file)]);
+    outputs::check(written, inputs, overwrite)?;
     let (plan, store) = arguments.which.open()?;
     let records = arguments.records(&plan, &store)?;
     if records.is_empty() {

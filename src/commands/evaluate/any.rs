@@ -27,7 +27,7 @@ use crate::sim::changes::{Change, Changed, Elevons};
 pub(super) struct AnyArguments {
     /// Distribution that --any draws from.
     #[arg(long, value_name = "FILE", default_value = "params/any/aircraft.toml", requires = "any")]
-    population: PathBuf,
+    pub(super) population: PathBuf,
     /// Fly each drawn aircraft also with each of these changes after 30 s: half the aileron, mass +30 %, centre of gravity 5 %
     /// of the chord aft, one elevon or aileron stuck.
     #[arg(long, requires = "any")]

@@ -15,6 +15,7 @@ use serde::Serialize;
 use super::flights::{FlightArguments, Flights};
 use crate::commands::files::{self, Overwrite, shipped};
 use crate::commands::interruption::{Ended, Interruption};
+use crate::commands::{given, outputs};
 use crate::learn::dynamics::export;
 use crate::learn::dynamics::residual_map::{ResidualMap, residual_map};
 use crate::learn::dynamics::score::{Horizon, free_run};
@@ -159,6 +160,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 /// Does the same as [`run`]. If `stop` is set, writes a checkpoint and ends early.
 pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let path = shipped(&arguments.prior);
+    arguments.check_outputs()?;
     let prior = arguments.prior(&path)?;
     let truth = arguments.truth.as_ref().map(|t| GreyBox::load(&shipped(t))).transpose()?;
     let Flights { learn, judge, samples, slowest_s, notes } = arguments.flights.read(&prior)?;
@@ -252,6 +254,13 @@ impl Document<'_> {
 }
 
 impl Arguments {
+    /// Fails if a file of the learned model would replace one of the prior or of the true model.
+    fn check_outputs(&self) -> Result<()> {
+        let written = [export::MODEL, export::RESIDUAL].map(|name| self.out.join(name));
+        let models = std::iter::once(&self.prior).chain(&self.truth);
+        outputs::separate(&written, models.flat_map(|path| given::files(path)))
+    }
+
     /// The prior in `path`, with the integrator that the options request.
     fn prior(&self, path: &Path) -> Result<GreyBox> {
         let mut prior = GreyBox::load(path)?;

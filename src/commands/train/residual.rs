@@ -56,6 +56,7 @@ pub struct Arguments {
 /// Reads the flights, fits the residual, prints the errors on the flights for validation and writes the model.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let path = shipped(&arguments.model);
+    arguments.check_outputs()?;
     let model = given::model(&arguments.model)?;
     if model.residual.is_some() {
         bail!(
@@ -64,10 +65,6 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         );
     }
     distinct(&arguments.logs.paths, &arguments.hold_out)?;
-    outputs::separate(&[arguments.out.join(export::MODEL)], given::files(&arguments.model))?;
-    if arguments.out.is_dir() {
-        files::writable(&arguments.out.join(export::MODEL), arguments.force.into())?;
-    }
     let (fit, held) = held_out::divided(&arguments.logs.paths, &arguments.hold_out);
     let clock = ActuatorClock::Estimated;
     let mut taken = arguments.logs.of(fit.clone()).take_in(&model, clock)?;
@@ -109,6 +106,17 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 impl Arguments {
+    /// Checks the files in the folder for the model, see [`outputs::check`]. The folder need not exist.
+    fn check_outputs(&self) -> Result<()> {
+        let written = [export::MODEL, export::RESIDUAL].map(|name| self.out.join(name));
+        let logs = self.logs.files().chain(&self.hold_out).cloned();
+        outputs::separate(&written, given::files(&self.model).into_iter().chain(logs))?;
+        match self.out.is_dir() {
+            true => files::writable(&self.out.join(export::MODEL), self.force.into()),
+            false => Ok(()),
+        }
+    }
+
     /// Writes the folder of the model `corrected`. `path` is the path of the model before it, and `fitted` are the logs of the fit.
     fn write(&self, corrected: &GreyBox, path: &Path, fitted: &[PathBuf]) -> Result<()> {
         std::fs::create_dir_all(&self.out)

@@ -117,6 +117,11 @@ impl Agent {
             .collect()
     }
 
+    /// Paths of the files of a policy in `folder`. [`Agent::load`] reads those that exist.
+    pub fn files(folder: &Path) -> [PathBuf; 3] {
+        FILES.map(|name| folder.join(name))
+    }
+
     /// Loads the policy in `folder` for `airframe`. A folder may have no critics, but not only one of the two.
     ///
     /// # Errors

@@ -8,6 +8,7 @@ use crate::checkpoint::write_whole;
 use crate::dynamics::basis::JXZ;
 use greylag_model::residual::{Origin, fingerprint};
 use greylag_model::{GreyBox, Integrator};
+use greylag_physics::formula::register;
 
 /// A model cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -118,7 +119,7 @@ fn effect_files(table: &toml::Table, beside: &Path) -> Result<Vec<(String, Vec<u
     let mut own: Vec<(String, Vec<u8>)> = Vec::new();
     for effect in table.get("effect_files").and_then(|e| e.as_array()).into_iter().flatten() {
         let path = beside.join(effect.as_str().unwrap_or_default());
-        for path in files_of(&path).map_err(fail("read", &path))? {
+        for path in register::files(&path).map_err(fail("read", &path))? {
             let bytes = std::fs::read(&path).map_err(fail("read", &path))?;
             let plain = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
             let (mut name, mut number) = (plain.clone(), 1);
@@ -130,18 +131,6 @@ fn effect_files(table: &toml::Table, beside: &Path) -> Result<Vec<(String, Vec<u
         }
     }
     Ok(own)
-}
-
-/// If `path` is a folder, its `.toml` files in the order of their names; otherwise `path` itself.
-fn files_of(path: &Path) -> std::io::Result<Vec<PathBuf>> {
-    if !path.is_dir() {
-        return Ok(vec![path.into()]);
-    }
-    let entries = std::fs::read_dir(path)?;
-    let mut all = entries.map(|e| Ok(e?.path())).collect::<std::io::Result<Vec<PathBuf>>>()?;
-    all.retain(|p| p.extension().is_some_and(|e| e == "toml"));
-    all.sort();
-    Ok(all)
 }
 
 /// Writes the value of the coefficient `name` of `model` into the model file's `table`. If the table has no entry for it, because

@@ -5,6 +5,7 @@
 //! until the process ends. If its file is read again unchanged, the same effect is returned. If the file was edited in between,
 //! [`find`] returns the new effect from then on, and models that were loaded before keep the earlier effect.
 
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{LazyLock, PoisonError, RwLock};
 
@@ -64,16 +65,25 @@ pub fn load(path: &Path) -> Result<Vec<&'static Written>, FileError> {
         why,
         example: "../effects/yaw_by_throttle.toml",
     };
-    let mut files: Vec<PathBuf> = vec![path.into()];
-    if path.is_dir() {
-        let entries = std::fs::read_dir(path).map_err(|why| unread(path, why))?;
-        let all = entries.filter_map(|e| e.ok().map(|e| e.path()));
-        files = all.filter(|p| p.extension().is_some_and(|e| e == "toml")).collect();
-        files.sort();
-    }
+    let files = files(path).map_err(|why| unread(path, why))?;
     let one = |path: &PathBuf| {
         let text = crate::text_file::read(path).map_err(|why| unread(path, why))?;
         read(&text).map_err(|why| FileError::Content { what, path: path.clone(), why })
     };
     files.iter().map(one).collect()
+}
+
+/// The effect files at `path`: the file itself, or every `.toml` file of a folder in the order of the names.
+///
+/// # Errors
+/// If the folder cannot be read.
+pub fn files(path: &Path) -> io::Result<Vec<PathBuf>> {
+    if !path.is_dir() {
+        return Ok(vec![path.into()]);
+    }
+    let entries = std::fs::read_dir(path)?;
+    let mut files = entries.map(|e| Ok(e?.path())).collect::<io::Result<Vec<PathBuf>>>()?;
+    files.retain(|p| p.extension().is_some_and(|e| e == "toml"));
+    files.sort();
+    Ok(files)
 }
