@@ -175,7 +175,8 @@ impl Monitor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use greylag_link::vehicle::{Order, VANE_SD};
+    use crate::pilot::frames::usable;
+    use greylag_link::vehicle::Order;
     use greylag_model::Trim;
     use greylag_physics::{ActuatorState, Controls};
     use std::path::Path;
@@ -215,11 +216,7 @@ mod tests {
             let frame = Telemetry {
                 time: Time::default().plus(Duration::from_millis(10 * i)),
                 order: Order::Next { lost: 0 },
-                faults: Faults::NONE,
                 state,
-                incidence_sd: VANE_SD,
-                yaw: 0.0,
-                rate_hold_s: 0.0,
                 specific_force: std::array::from_fn(|k| linear[k] - gravity[k]),
                 actuators: ActuatorState {
                     aileron,
@@ -229,9 +226,7 @@ mod tests {
                     ..ActuatorState::default()
                 },
                 altitude,
-                position: [f64::NAN; 2],
-                velocity: [f64::NAN; 3],
-                wind: [f64::NAN; 3],
+                ..usable()
             };
             found.extend(monitor.see(&frame).map(|warning| (at, warning)));
             state = state.advance(&truth.rate(&state, &controls, altitude), DT);

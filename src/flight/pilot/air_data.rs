@@ -188,7 +188,7 @@ fn airspeed_by_lift(curve: &LiftCurve, frame: &Telemetry, alpha: f64) -> Option<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use greylag_link::vehicle::Order;
+    use crate::pilot::frames::usable;
     use greylag_model::{GreyBox, Trim, Twin};
     use greylag_physics::rigid_body::body_to_horizon;
     use greylag_physics::{ActuatorState, State};
@@ -215,19 +215,14 @@ mod tests {
             let [ahead, _, down] = body_to_horizon(&trim.state, body);
             let (sin, cos) = 0.8f64.sin_cos();
             let frame = Telemetry {
-                time: Time::default(),
-                order: Order::First,
-                faults: Faults::NONE,
                 state: trim.state,
-                incidence_sd: VANE_SD,
                 yaw: 0.8,
-                rate_hold_s: 0.0,
                 specific_force,
                 actuators: ActuatorState { elevator: trim.controls.elevator, ..Default::default() },
                 altitude,
-                position: [f64::NAN; 2],
                 velocity: [cos * ahead + 6.0, sin * ahead, down],
                 wind: [6.0, 0.0, 0.0],
+                ..usable()
             };
             let curve = LiftCurve::of(&model, 20.0).unwrap().unwrap();
             Level { curve, frame, check: AirDataCheck::default(), k: 0 }

@@ -45,26 +45,19 @@ impl GroundVelocity {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use greylag_link::vehicle::{Faults, Order, VANE_SD};
-    use greylag_physics::{ActuatorState, State};
+    use crate::pilot::frames::usable_at;
+    use greylag_physics::State;
 
     /// A state `k` hundredths of a second after the first, with its pitch (rad) and specific force (m/s²), and a velocity of 20 m/s
     /// to the east.
     fn frame(k: u64, pitch: f64, specific_force: [f64; 3]) -> Telemetry {
         Telemetry {
-            time: Time::from_micros(10_000 * k),
-            order: Order::First,
-            faults: Faults::NONE,
             state: State { pitch, airspeed: 20.0, ..State::NEUTRAL },
-            incidence_sd: VANE_SD,
             yaw: std::f64::consts::FRAC_PI_2,
-            rate_hold_s: 0.0,
             specific_force,
-            actuators: ActuatorState::default(),
-            altitude: 600.0,
-            position: [f64::NAN; 2],
             velocity: [0.0, 20.0, 0.0],
             wind: [0.0; 3],
+            ..usable_at(k)
         }
     }
 

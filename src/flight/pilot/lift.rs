@@ -145,7 +145,7 @@ impl ByLift {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use greylag_link::vehicle::Order;
+    use crate::pilot::frames::usable_at;
     use greylag_physics::ActuatorState;
 
     fn model() -> GreyBox {
@@ -165,19 +165,12 @@ mod tests {
         let state = State { alpha: truth, airspeed: 20.0, ..State::NEUTRAL };
         let specific_force = Twin::at_rest(state, &trim.controls, altitude).specific_force(model);
         Telemetry {
-            time: Time::from_micros(10_000 * k),
-            order: Order::First,
-            faults: Faults::NONE,
             state: State { alpha: estimated, ..state },
             incidence_sd: [0.02; 2],
-            yaw: 0.0,
-            rate_hold_s: 0.0,
             specific_force,
             actuators: ActuatorState { elevator: trim.controls.elevator, ..Default::default() },
             altitude,
-            position: [f64::NAN; 2],
-            velocity: [f64::NAN; 3],
-            wind: [f64::NAN; 3],
+            ..usable_at(k)
         }
     }
 

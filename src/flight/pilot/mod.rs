@@ -16,6 +16,8 @@ mod decision;
 mod envelope;
 mod estimate;
 mod failsafe;
+#[cfg(test)]
+pub(crate) mod frames;
 mod ground_velocity;
 mod lift;
 mod limits;

@@ -59,35 +59,17 @@ const HALF_TURN: f64 = std::f64::consts::PI + 1e-3;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use greylag_link::vehicle::{Order, VANE_SD};
-    use greylag_physics::{ActuatorState, State, Time};
-
-    fn good() -> Telemetry {
-        Telemetry {
-            time: Time::default(),
-            order: Order::First,
-            faults: Faults::NONE,
-            state: State::NEUTRAL,
-            incidence_sd: VANE_SD,
-            yaw: 0.0,
-            rate_hold_s: 0.0,
-            specific_force: [0.0, 0.0, -9.81],
-            actuators: ActuatorState::default(),
-            altitude: 600.0,
-            position: [f64::NAN; 2],
-            velocity: [f64::NAN; 3],
-            wind: [f64::NAN; 3],
-        }
-    }
+    use crate::pilot::frames::usable;
+    use greylag_physics::{ActuatorState, State};
 
     #[test]
     fn a_frame_without_position_can_be_flown_on() {
-        assert_eq!(defect(&good()), None);
+        assert_eq!(defect(&usable()), None);
     }
 
     #[test]
     fn a_fault_of_the_accelerometer_alone_does_not_stop_control() {
-        let mut frame = good();
+        let mut frame = usable();
         frame.faults.insert(Faults::SPECIFIC_FORCE);
         assert_eq!(defect(&frame), None);
         frame.faults.insert(Faults::RATES);
@@ -98,13 +80,13 @@ mod tests {
     fn each_value_that_is_not_finite_or_absurd_is_a_defect() {
         for bad in [f64::NAN, f64::INFINITY, -1e30] {
             for i in 0..8 {
-                let mut frame = good();
+                let mut frame = usable();
                 let mut x = frame.state.to_array();
                 x[i] = bad;
                 frame.state = State::from_array(x);
                 assert!(defect(&frame).is_some(), "state component {i} = {bad}");
             }
-            assert!(defect(&Telemetry { altitude: bad, ..good() }).is_some());
+            assert!(defect(&Telemetry { altitude: bad, ..usable() }).is_some());
         }
         for i in 0..5 {
             let mut z = ActuatorState::default();
@@ -116,7 +98,7 @@ mod tests {
                 &mut z.throttle,
             ][i] = f64::NAN;
             assert!(
-                defect(&Telemetry { actuators: z, ..good() }).is_some(),
+                defect(&Telemetry { actuators: z, ..usable() }).is_some(),
                 "actuator component {i}"
             );
         }
@@ -125,7 +107,7 @@ mod tests {
     #[test]
     fn the_edge_of_the_plausible_is_still_flown() {
         // an inverted spin at a roll rate just below the full scale of gyroscopes (35 rad/s)
-        let mut frame = good();
+        let mut frame = usable();
         frame.state.roll = -std::f64::consts::PI;
         frame.state.p = 34.9;
         frame.state.airspeed = 0.0;
@@ -141,7 +123,7 @@ mod tests {
             (0.0, 1.58, Some("attitude")),
             (3.15, 0.0, Some("attitude")),
         ] {
-            let mut frame = good();
+            let mut frame = usable();
             (frame.state.roll, frame.state.pitch) = (roll, pitch);
             assert_eq!(defect(&frame), fault, "{roll} {pitch}");
         }

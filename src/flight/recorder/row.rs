@@ -140,28 +140,15 @@ fn sample(state: &Telemetry, decision: &Decision) -> Sample {
 mod tests {
     use super::*;
     use crate::pilot::Source;
+    use crate::pilot::frames::usable;
     use greylag_control::Target;
     use greylag_link::autopilot::Mode;
-    use greylag_link::vehicle::{Order, VANE_SD};
-    use greylag_physics::{ActuatorState, Command, State, Time};
+    use greylag_physics::{Command, State, Time};
 
     /// Airspeed (m/s) and altitude (m) in the row of a state with `faults`.
     fn recorded(faults: Faults) -> [f64; 2] {
-        let state = Telemetry {
-            time: Time::default(),
-            order: Order::First,
-            faults,
-            state: State { airspeed: 20.0, ..State::NEUTRAL },
-            incidence_sd: VANE_SD,
-            yaw: 0.0,
-            rate_hold_s: 0.0,
-            specific_force: [0.0, 0.0, -9.81],
-            actuators: ActuatorState::default(),
-            altitude: 600.0,
-            position: [f64::NAN; 2],
-            velocity: [f64::NAN; 3],
-            wind: [f64::NAN; 3],
-        };
+        let state =
+            Telemetry { faults, state: State { airspeed: 20.0, ..State::NEUTRAL }, ..usable() };
         let decision = Decision {
             time: Time::default(),
             command: Command::IDLE,
