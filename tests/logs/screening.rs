@@ -149,6 +149,26 @@ fn each_wrong_column_is_named_and_its_cure_cures_it() {
 }
 
 #[test]
+fn a_command_that_moves_with_a_reversed_deflection_is_corrected_with_it() {
+    let cases: [(fn(&mut Sample), &str); 2] = [
+        (|s| (s.aileron_rad, s.aileron_cmd) = (-s.aileron_rad, -s.aileron_cmd), "aileron"),
+        (|s| (s.elevator_rad, s.elevator_cmd) = (-s.elevator_rad, -s.elevator_cmd), "elevator"),
+    ];
+    for (change, surface) in cases {
+        let bytes = spoiled(change);
+        let said = found(&bytes, "");
+        let cures = ["rad", "cmd"].map(|unit| {
+            format!("{surface}_{unit} = {{ from = \"csv.{surface}_{unit}\", scale = -1 }}")
+        });
+        assert!(cures.iter().all(|cure| said.contains(cure)), "{surface}: {said}");
+        assert_eq!(found(&bytes, &cures.join("\n")), "", "{surface}: with the mapping");
+    }
+    // a command whose sign is right stays beside a deflection whose sign is wrong
+    let said = found(&spoiled(|s| s.aileron_rad *= -1.0), "");
+    assert!(said.contains("aileron_rad") && !said.contains("aileron_cmd"), "{said}");
+}
+
+#[test]
 fn foreign_axes_are_named_as_such() {
     let said = found(
         &spoiled(|s| {

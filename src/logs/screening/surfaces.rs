@@ -2,7 +2,9 @@
 //! finding is a message to the user of a log.
 
 use super::cured;
-use super::relation::{change, mean, partial_correlation, quantile, tame, values, windows};
+use super::relation::{
+    change, mean, partial_correlation, quantile, tame, values, windows, with_intercept,
+};
 use crate::Sample;
 use crate::finding::Finding;
 use crate::phases::Flying;
@@ -21,16 +23,52 @@ const TURNED_LIVELY: f64 = 0.35;
 const LIVELY: f64 = 0.2;
 const MANY: usize = 200;
 
+/// Correlation of a command with the deflection of its surface from which on the command has the sign of the deflection. Below
+/// the negative value it has the opposite sign.
+const FOLLOWS: f64 = 0.5;
+
 type Get = fn(&Sample) -> f64;
+
+/// The columns of a surface: its deflection and its command.
+type Surface = [(&'static str, Get); 2];
+
+const AILERON: Surface = [("aileron_rad", |s| s.aileron_rad), ("aileron_cmd", |s| s.aileron_cmd)];
+const ELEVATOR: Surface =
+    [("elevator_rad", |s| s.elevator_rad), ("elevator_cmd", |s| s.elevator_cmd)];
 
 /// Checks the units and, if units and axes are right, the directions in which aileron and elevator act.
 pub fn check(rows: &[Sample], axes_are_right: bool, flies: &Flying) -> Vec<Finding> {
     let mut out: Vec<Finding> = units(rows);
     if out.is_empty() && axes_are_right {
-        out.extend(aileron(rows, flies));
-        out.extend(elevator(rows, flies));
+        for (found, surface) in [(aileron(rows, flies), AILERON), (elevator(rows, flies), ELEVATOR)]
+        {
+            let beside = found.as_ref().and_then(|f| command(f, rows, surface));
+            out.extend(found.into_iter().chain(beside));
+        }
     }
     out
+}
+
+/// Checks the command of a surface beside its deflection, which `found` calls reversed. A command that moves with the deflection
+/// is reversed as well, and one that moves against it is right. `None` for a right command, without a command, and if `found` is
+/// about the command.
+fn command(found: &Finding, rows: &[Sample], surface: Surface) -> Option<Finding> {
+    let [(deflection, position), (column, get)] = surface;
+    if !found.corrects(deflection) || !moves(rows, get) {
+        return None;
+    }
+    let relation = with_intercept(rows.iter().map(|s| (get(s), position(s))));
+    match relation.map_or(0.0, |r| r.correlation) {
+        r if r > FOLLOWS => Some(cured(
+            format!("{column} has the sign of {deflection}, which acts the other way"),
+            column,
+            -1.0,
+        )),
+        r if r < -FOLLOWS => None,
+        _ => Some(Finding::warning(format!(
+            "{column} is left as it is: it does not follow {deflection}, which acts the other way, closely enough to show its own sign; compare the two at a step"
+        ))),
+    }
 }
 
 fn units(rows: &[Sample]) -> Vec<Finding> {
@@ -85,8 +123,7 @@ fn throttle(column: &str, size: f64) -> Finding {
 /// Checks the direction of the aileron by a regression of ṗ on p, r, β (if known) and the aileron. Positive aileron must
 /// accelerate the right wing downwards.
 fn aileron(rows: &[Sample], flies: &Flying) -> Option<Finding> {
-    let (column, get) =
-        moving(rows, [("aileron_rad", |s| s.aileron_rad), ("aileron_cmd", |s| s.aileron_cmd)])?;
+    let (column, get) = moving(rows, AILERON)?;
     let beta = has(rows, |s| s.beta_rad);
     let regressors = |w: &[Sample]| {
         let mut all = vec![mean(w, |s| s.rates_radps[0]), mean(w, |s| s.rates_radps[2])];
@@ -107,8 +144,7 @@ fn aileron(rows: &[Sample], flies: &Flying) -> Option<Finding> {
 /// Checks the direction of the elevator by a regression of q̇ on q, α and the elevator. If α is unknown, the specific force
 /// along body z divided by V² takes its place. Positive elevator must accelerate the nose downwards.
 fn elevator(rows: &[Sample], flies: &Flying) -> Option<Finding> {
-    let (column, get) =
-        moving(rows, [("elevator_rad", |s| s.elevator_rad), ("elevator_cmd", |s| s.elevator_cmd)])?;
+    let (column, get) = moving(rows, ELEVATOR)?;
     let alpha: Get = match has(rows, |s| s.alpha_rad) {
         true => |s| s.alpha_rad,
         false => |s| s.specific_force_mps2[2] / s.airspeed_mps.powi(2),
@@ -126,12 +162,15 @@ fn has(rows: &[Sample], get: Get) -> bool {
     2 * values(rows, get).len() > rows.len()
 }
 
-/// The first of the columns that has values in more than half of the rows and that changes.
-fn moving(rows: &[Sample], columns: [(&'static str, Get); 2]) -> Option<(&'static str, Get)> {
-    columns.into_iter().find(|(_, get)| {
-        let all = values(rows, *get);
-        2 * all.len() > rows.len() && all.iter().any(|x| *x != all[0])
-    })
+/// The first of the columns that moves.
+fn moving(rows: &[Sample], columns: Surface) -> Option<(&'static str, Get)> {
+    columns.into_iter().find(|(_, get)| moves(rows, *get))
+}
+
+/// Whether more than half of the rows have a value in the column, and these change.
+fn moves(rows: &[Sample], get: Get) -> bool {
+    let all = values(rows, get);
+    2 * all.len() > rows.len() && all.iter().any(|x| *x != all[0])
 }
 
 /// The partial correlation of the angular acceleration about `axis` with the last regressor, and the number of windows over
@@ -187,5 +226,24 @@ mod tests {
         assert_eq!(found(-1.0, 1.0).unwrap().cure.unwrap().column, "aileron_rad");
         // the correlation is the same at small deflections, where a controller's feedback might cause it
         assert!(found(-1.0, 0.1).is_none());
+    }
+
+    #[test]
+    fn a_command_beside_a_reversed_aileron_is_corrected_if_it_moves_with_it() {
+        fn found(command: Get) -> Vec<Finding> {
+            let mut rows = rolling(-1.0, 1.0);
+            rows.iter_mut().for_each(|s| s.aileron_cmd = command(s));
+            check(&rows, true, &Flying::default())
+        }
+        let [first, beside] = &found(|s| 2.0 * s.aileron_rad)[..] else { panic!() };
+        assert!(first.corrects("aileron_rad") && beside.corrects("aileron_cmd"), "{beside}");
+        let [against] = &found(|s| -2.0 * s.aileron_rad)[..] else { panic!() };
+        assert!(!against.corrects("aileron_cmd"), "{against}");
+        // a stick of another period, as of a flight controller that answers the gusts itself
+        let [_, unclear] = &found(|s| (6.0 * s.time_s).sin())[..] else { panic!() };
+        assert!(
+            unclear.cure.is_none() && unclear.text.contains("aileron_cmd is left"),
+            "{unclear}"
+        );
     }
 }
