@@ -150,6 +150,9 @@ OTHERS = """
   return !said.startsWith(name) && !said.includes('little is left');
 }))('CHANNEL')
 """
+# Cells of channels in which the flights cannot judge the model that are drawn as judged, or without the reason under the grid.
+JUDGED = """[...document.querySelectorAll('.grid button')].filter(b => b.getAttribute('aria-label').includes(': withheld'))
+  .filter(b => b.textContent || !document.querySelector('#failing .scroll').textContent.includes('Withheld: ')).length"""
 # Cells of the grid that stand outside of its pane, or under its neighbours.
 CUT = """(() => { const scroll = document.querySelector('#failing .scroll'); const box = scroll.getBoundingClientRect();
 return [...scroll.querySelectorAll('td, th')].filter(e => { const r = e.getBoundingClientRect(); return r.right > box.right + 1 || r.left < box.left - 1 || r.right > innerWidth; }).length; })()"""
@@ -163,6 +166,8 @@ def where_the_tuned_model_fails(browser, acts_in):
         found.append(f"the worst cell of the tuned model is in {browser.value(CHOSEN)}, the verdict is about {acts_in}")
     if others := browser.value(OTHERS.replace("CHANNEL", acts_in)):
         found.append(f"the sentence under the grid is not about the chosen cell: {acts_in} over {', '.join(others)}")
+    if judged := browser.value(JUDGED):
+        found.append(f"{judged} cells of withheld channels are drawn as judged")
     r2 = "[...document.querySelectorAll('.grid td.fit')].map(e => e.textContent).join()"
     tuned = browser.value(r2)
     click(browser, "[data-base=given]")

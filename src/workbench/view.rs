@@ -107,6 +107,8 @@ struct FailingView<'a> {
     /// Origin of each model: given, tuned or amended.
     ways: Vec<Way>,
     models: &'a [ModelResult],
+    /// Physically impossible estimates, in words, and what follows. If there are any, forces and moments are withheld.
+    doubtful: &'a [String],
     notes: &'a [String],
 }
 
@@ -202,6 +204,7 @@ impl Bench {
             flights: comparison.flights.iter().filter_map(place).collect(),
             ways,
             models: &comparison.models,
+            doubtful: &comparison.doubtful,
             notes: &comparison.notes,
         };
         Ok(serde_json::to_value(&view)?)

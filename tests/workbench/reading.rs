@@ -51,3 +51,22 @@ fn a_log_of_the_command_line_that_cannot_be_used_is_shown_with_its_error() {
         assert!(error.contains("photo.csv") && error.contains("no flight log"), "{state}");
     }
 }
+
+#[test]
+fn forces_and_moments_are_withheld_beside_a_figure_that_cannot_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("pitot.csv");
+    let flown = fly("", 40.0, Manoeuvres::Usual, 20);
+    let mut flight = sensors::spoil(&flown, &errors(20), 0);
+    // no unit has this factor
+    flight.samples.iter_mut().for_each(|s| s.airspeed_mps *= 0.65);
+    csv::save(&flight, &log).unwrap();
+    let line = ["--despite-problems", "--model", MODEL, log.to_str().unwrap()];
+    let bench = Bench::open(&folder.path().join("session"), &line);
+    let (status, failing) = bench.get("/api/failing");
+    assert_eq!(status, 200, "{}", word(&failing));
+    let said = &failing["doubtful"];
+    let first = said[0].as_str().unwrap_or_default();
+    assert!(first.starts_with("pitot.csv: airspeed_scale is found at 0.6"), "{said}");
+    assert!(said[1].as_str().is_some_and(|s| s.contains("nothing is said about forces")), "{said}");
+}

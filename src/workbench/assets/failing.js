@@ -113,11 +113,22 @@ const share = (channel) => (channel?.unexplained_fraction == null ? null : 1 - c
 function cells(channel) {
   return Object.fromEntries(channel.bins.map((b) => [b.variable, b]));
 }
+/** Whether a physically impossible estimate in the flights withholds all channels, as `compare` does. */
+const withheld = () => !!bench.failing?.doubtful.length;
+/** Those of the channels in which the flights suffice to judge the model; all of them if there is none. */
+function judgeable(channels) {
+  const open = channels.filter((c) => !c.abstained);
+  return open.length ? open : channels;
+}
 function grid() {
+  if (withheld()) {
+    parts.grid.replaceChildren(...bench.failing.doubtful.map((said) => el("p", { class: "bad" }, said)));
+    return parts.finding.replaceChildren();
+  }
   const [before, after] = models();
   const channels = before.channels.filter((c) => "DLYlmn".includes(c.channel));
   const shown = channels.length ? channels : before.channels;
-  const most = Math.max(...shown.map((c) => Math.min(1, c.unexplained_fraction ?? 0)), 1e-9);
+  const most = Math.max(...judgeable(shown).map((c) => Math.min(1, c.unexplained_fraction ?? 0)), 1e-9);
   if (!pick.by_hand || !shown.some((c) => c.channel === pick.channel)) start(shown);
   const size = (c) => Math.sqrt(Math.min(1, (c.unexplained_fraction ?? 0) / most));
   const fits = [["R²", `share of the channel's variance beyond noise that the model explains, ${word()}`, (c) => r2(share(c))],
@@ -126,8 +137,15 @@ function grid() {
   const one = (c, v) => el("td", {}, cells(c)[v] && cell(c, cells(c)[v], size(c)));
   const table = narrow.matches ? turned(shown, fits, used, one) : upright(shown, fits, one);
   const symbols = used.map((v) => `${SYMBOL[v]} ${name(shown, v)}`).join(", ");
-  parts.grid.replaceChildren(table, el("p", { class: "note" }, `R²: what the model explains, ${word()}${after ? `; after: ${with_effects()}` : ""}. Numbers: how much of what is left goes with each variable, %. ${narrow.matches ? "" : `${symbols}.`}`), late() ?? "");
+  parts.grid.replaceChildren(table, el("p", { class: "note" }, `R²: what the model explains, ${word()}${after ? `; after: ${with_effects()}` : ""}. Numbers: how much of what is left goes with each variable, %. ${narrow.matches ? "" : `${symbols}.`}`), unjudged(shown) ?? "", late() ?? "");
   finding();
+}
+/** Caption on the channels in which the flights cannot judge the model, with the reasons; null if there is none. */
+function unjudged(shown) {
+  const reasons = [...new Set(shown.map((c) => c.abstained).filter(Boolean))];
+  const names = (why) => shown.filter((c) => c.abstained === why).map((c) => c.name).join(" and ");
+  const said = reasons.map((why) => `${names(why)}, for ${why}`);
+  return said.length ? el("p", { class: "note" }, `${MARK} Withheld: ${said.join("; ")}.`) : null;
 }
 /** Caption on the columns of deflection rates in flights whose recorded deflections are late; null if there is none. */
 function late() {
@@ -143,28 +161,33 @@ function late() {
 function upright(shown, fits, one) {
   const head = el("tr", {}, el("th", { scope: "col" }, "Channel"), fits.map(([sign, title]) => el("th", { scope: "col", class: "number", title }, sign)),
     VARIABLES.map((v) => el("th", { scope: "col", class: "number" }, el("abbr", { title: name(shown, v) }, SYMBOL[v]))));
-  const rows = shown.map((c) => el("tr", {}, el("th", { scope: "row" }, c.name), fits.map(([, , of]) => el("td", { class: "fit" }, of(c))), VARIABLES.map((v) => one(c, v))));
+  const rows = shown.map((c) => el("tr", {}, el("th", { scope: "row" }, titled(c)), fits.map(([, , of]) => el("td", { class: "fit" }, of(c))), VARIABLES.map((v) => one(c, v))));
   return el("table", { class: "grid" }, el("thead", {}, head), el("tbody", {}, rows));
 }
 /** The table with one column for each channel, for a screen that is too narrow for one column for each variable. */
 function turned(shown, fits, used, one) {
-  const head = el("tr", {}, el("td"), shown.map((c) => el("th", { scope: "col" }, c.name)));
+  const head = el("tr", {}, el("td"), shown.map((c) => el("th", { scope: "col" }, titled(c))));
   const top = fits.map(([sign, title, of]) => el("tr", {}, el("th", { scope: "row", title }, sign), shown.map((c) => el("td", { class: "fit" }, of(c)))));
   const rows = used.map((v) => el("tr", {}, el("th", { scope: "row" }, name(shown, v)), shown.map((c) => one(c, v))));
   return el("table", { class: "grid turned" }, el("thead", {}, head), el("tbody", {}, top, rows));
 }
+/** Mark of a channel in which the flights cannot judge the model. */
+const MARK = "†";
+const titled = (c) => (c.abstained ? `${c.name} ${MARK}` : c.name);
 const r2 = (v) => (v == null ? "–" : v > 0.9995 ? "1.000" : v < -9.995 ? "under −9" : show(v, v >= 0.995 ? 4 : 3));
 const name = (channels, v) => channels.flatMap((c) => c.bins).find((b) => b.variable === v)?.name ?? v;
 function cell(channel, bins, size) {
-  const weight = bins.explained * size;
+  const weight = channel.abstained ? 0 : bins.explained * size;
+  const place = `${channel.name} over ${bins.name}`;
+  const why = channel.abstained && `withheld, for ${channel.abstained}`;
   const pressed = pick.channel === channel.channel && pick.variable === bins.variable;
   return el("button", {
     type: "button", "aria-pressed": pressed ? "true" : "false", class: weight > 0.58 ? "strong" : "", vars: { "--weight": `${Math.round(100 * weight)}%` },
     "data-channel": channel.channel, "data-variable": bins.variable,
-    "aria-label": `${channel.name} over ${bins.name}: ${Math.round(100 * bins.explained)} % of the residual's variance`,
-    title: `${percent(bins.explained)} of the variance of what ${channel.name} leaves goes with ${bins.name}`,
+    "aria-label": `${place}: ${why ?? `${Math.round(100 * bins.explained)} % of the residual's variance`}`,
+    title: why ? `${place}: ${why}` : `${percent(bins.explained)} of the variance of what ${channel.name} leaves goes with ${bins.name}`,
     onclick: () => { Object.assign(pick, { channel: channel.channel, variable: bins.variable, by_hand: true }); pressed_cell(); },
-  }, bins.explained >= 0.05 ? String(Math.round(100 * bins.explained)) : "");
+  }, !why && bins.explained >= 0.05 ? String(Math.round(100 * bins.explained)) : "");
 }
 /** Updates the pane after a cell was chosen: its times are highlighted, in another flight if this one has none. */
 function pressed_cell() {
@@ -176,10 +199,10 @@ function pressed_cell() {
     brush();
   }
 }
-/** The cell in which an effect acts: of its channels, the one that the model explains least; the variable of its curve, else the one
- *  that explains most there. Null if there is none. */
+/** The cell in which an effect acts: of its channels that the flights can judge, the one that the model explains least; the variable
+ *  of its curve, else the one that explains most there. Null if there is none. */
 function cell_of(effect, channels) {
-  const own = channels.filter((c) => effect.channels.includes(c.channel));
+  const own = judgeable(channels.filter((c) => effect.channels.includes(c.channel)));
   const channel = own.sort((a, b) => (b.unexplained_fraction ?? 0) - (a.unexplained_fraction ?? 0))[0];
   const usable = channel?.bins.filter((b) => VARIABLES.includes(b.variable)) ?? [];
   const drawn = effect.curve?.channel === channel?.channel ? usable.find((b) => effect.curve?.variable.startsWith(b.name)) : null;
@@ -201,7 +224,7 @@ function start(channels) {
     return;
   }
   let best = -1;
-  for (const c of channels)
+  for (const c of judgeable(channels))
     for (const b of c.bins.filter((b) => VARIABLES.includes(b.variable))) {
       const weight = b.explained * Math.min(1, c.unexplained_fraction ?? 0);
       if (weight > best) [best, pick.channel, pick.variable] = [weight, c.channel, b.variable];
@@ -209,9 +232,11 @@ function start(channels) {
 }
 const chosen = (model) => model?.channels.find((c) => c.channel === pick.channel);
 const over = (channel) => channel?.bins.find((b) => b.variable === pick.variable);
-/** The bin with the largest mean residual of the model without effects. */
+/** The bin with the largest mean residual of the model without effects. Null if the channel is withheld. */
 function worst() {
-  const bins = over(chosen(models()[0]))?.bins ?? [];
+  const channel = bench.failing && chosen(models()[0]);
+  if (withheld() || channel?.abstained) return null;
+  const bins = over(channel)?.bins ?? [];
   const supported = bins.filter((b) => b.supported);
   return (supported.length ? supported : bins).reduce((a, b) => (a && Math.abs(a.mean) >= Math.abs(b.mean) ? a : b), null);
 }
@@ -312,7 +337,7 @@ function brush() {
     let [inside, all] = [0, 0];
     const channel = models()[0].channels.find((c) => c.channel === button.dataset.channel);
     const values = flight?.regimes[button.dataset.variable];
-    const bins = channel?.bins.find((b) => b.variable === button.dataset.variable)?.bins.filter((b) => b.supported) ?? [];
+    const bins = channel?.abstained ? [] : channel?.bins.find((b) => b.variable === button.dataset.variable)?.bins.filter((b) => b.supported) ?? [];
     const bin = bins.reduce((a, b) => (a && Math.abs(a.mean) >= Math.abs(b.mean) ? a : b), null);
     if (pick.window && values && bin)
       values.forEach((v, i) => {
@@ -333,7 +358,8 @@ export function freshFailing(of) {
     parts.where.hidden = parts.tools.hidden = parts.states.hidden = true;
     return;
   }
-  parts.where.hidden = parts.tools.hidden = parts.states.hidden = false;
+  parts.tools.hidden = parts.states.hidden = false;
+  parts.where.hidden = withheld();
   if (pick.flight !== bench.chosen_path) Object.assign(pick, { window: null, run: null, at: null, flight: bench.chosen_path });
   bench.light(lit);
   time();
@@ -345,7 +371,7 @@ export function freshFailing(of) {
 
 function time() {
   const { flight } = bench;
-  if (!flight) return;
+  if (!flight || withheld()) return;
   const list = flight.channels[symbol(pick.channel)];
   const channel = chosen(models()[0]);
   if (!list || !channel) return;
@@ -373,7 +399,7 @@ function time() {
 /** Maps of the mean residual over α and β, one for each model, on one colour scale. */
 function maps() {
   const all = models().map((m) => chosen(m)?.map).filter((m) => m?.cells.length);
-  if (!all.length) return parts.map.replaceChildren();
+  if (!all.length || chosen(models()[0]).abstained) return parts.map.replaceChildren();
   const unit = chosen(models()[0]).unit;
   const sizes = (only) => all.flatMap((m) => m.cells).filter((c) => c.supported || !only).map((c) => Math.abs(c.mean));
   const limit = Math.max(...sizes(true), 0) || Math.max(...sizes(false), 1e-12);
@@ -423,7 +449,8 @@ const symbol = (channel) => ({ V: "V̇", alpha: "α̇", beta: "β̇" })[channel]
 
 /** Plot of the mean residual over the variable, with its interval. */
 function bins(channel, variable) {
-  if (!variable) return;
+  parts.bins.figure.hidden = !!channel.abstained;
+  if (!variable || channel.abstained) return;
   const both = models().map((m) => over(chosen(m))?.bins ?? []);
   parts.bins.caption.replaceChildren(el("b", {}, `Residual (${channel.unit}) over ${variable.name}${variable.unit ? ` (${variable.unit})` : ""}`));
   const tables = both.map((list) => [list.map((b) => b.center), list.map((b) => b.mean)]);
