@@ -35,6 +35,11 @@ const SLOPE: f64 = 0.7;
 /// scale of a state (eq. 21 of \[GSFM26\], see `src/lib.rs`).
 const CALM: f64 = 0.02;
 
+/// Prediction error of one step above which the difference is a jump of a sensor and not a motion. Severe turbulence changes the
+/// flow angles by 0.02 rad in a step and the airspeed by 0.4 m/s.
+const JUMP: State =
+    State { roll: 0.1, pitch: 0.1, airspeed: 3.0, p: 2.0, q: 2.0, r: 2.0, alpha: 0.05, beta: 0.05 };
+
 /// Recursive estimator of the disturbance and of the model's prediction error.
 #[derive(Clone, Debug)]
 pub(crate) struct Disturbance {
@@ -71,7 +76,8 @@ impl Disturbance {
     }
 
     /// Updates the estimates with the difference between `seen` and the model's prediction from the last tick. After a gap
-    /// between ticks, and with values that are not finite, the estimates do not change.
+    /// between ticks, and with values that are not finite, the estimates do not change. A jump of a sensor sets the disturbance
+    /// to zero.
     pub fn update(&mut self, model: &GreyBox, seen: &Observation) {
         let follows = |last: &Observation| {
             let gap = seen.time.since(last.time).as_secs_f64();
@@ -93,6 +99,11 @@ impl Disturbance {
             - std::f64::consts::PI;
         let step = seen.state.advance(&last.state, -1.0);
         self.compare(model, &error.advance(&self.rate, -STEP), &step);
+        if is_jump(&error) {
+            // the estimate up to now was of the other reading
+            self.rate = NONE;
+            return;
+        }
         // `error` is the deviation from the model's prediction after one step, and `error` / STEP is the corresponding rate
         let part = STEP / self.time_constant;
         let moved = self.rate.advance(&self.rate, -part).advance(&error, part / STEP);
@@ -148,6 +159,11 @@ impl Disturbance {
     }
 }
 
+/// Whether the prediction error `error` of one step exceeds [`JUMP`] in any state.
+fn is_jump(error: &State) -> bool {
+    error.to_array().into_iter().zip(JUMP.to_array()).any(|(error, most)| error.abs() > most)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -189,6 +205,42 @@ mod tests {
         seen.state.q += 5.0;
         disturbance.update(&model, &seen);
         assert_eq!(disturbance.rate(), found);
+    }
+
+    /// A blocked airspeed tube that opens must not look like an acceleration of 2000 m/s²: the envelope limiter, which adds the
+    /// estimate to its model, pitched the aircraft down by 45° after it.
+    #[test]
+    fn a_jump_of_a_sensor_is_no_disturbance() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/prior.toml");
+        let model = GreyBox::load(&path).unwrap();
+        let jumps = [
+            State { airspeed: 20.0, ..NONE },
+            State { alpha: -0.095, ..NONE },
+            State { beta: 0.1, ..NONE },
+            State { roll: 0.2, ..NONE },
+        ];
+        for jump in jumps {
+            let mut disturbance = Disturbance::new(TIME_CONSTANT_S);
+            let mut seen = Observation {
+                time: Time::default(),
+                state: State::NEUTRAL,
+                actuators: ActuatorState::default(),
+                altitude: 600.0,
+                previous: [Command::IDLE; 2],
+            };
+            let mut memory = Memory::default();
+            for tick in 0..60 {
+                disturbance.update(&model, &seen);
+                let controls = seen.actuators.controls();
+                seen.state = model.step(&seen.state, &controls, seen.altitude, &mut memory);
+                if tick == 50 {
+                    seen.state = seen.state.advance(&jump, 1.0);
+                }
+                seen.time = seen.time.plus(Duration::from_secs_f64(STEP));
+            }
+            let found = disturbance.rate();
+            assert!(found.to_array().iter().all(|x| x.abs() < 1e-6), "{jump:?}: {found:?}");
+        }
     }
 
     /// The estimator for `model` after a simulated flight of 10 s with the model `truth`. Aileron and elevator alternate between
