@@ -93,8 +93,8 @@ pub fn broken(text: &str) -> String {
     lines.join("\n")
 }
 
-/// Prints a line to standard output. It does nothing if the reader has closed the output. `println!` would panic then, and
-/// a panic of the main thread ends the flight.
+/// Prints a line to standard output and ignores all errors. `println!` would end the program on a full disk, and the flight
+/// with it.
 pub fn say(line: Arguments<'_>) {
     let _ = writeln!(io::stdout(), "{line}");
 }
