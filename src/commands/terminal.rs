@@ -119,6 +119,14 @@ pub fn print_answer(answer: &Answer) {
     println!();
 }
 
+/// The line of a note of a result. It begins with one word of severity.
+pub fn noted(note: &str) -> String {
+    match ["note: ", "warning: ", "problem: "].iter().any(|word| note.starts_with(*word)) {
+        true => note.to_owned(),
+        false => format!("note: {note}"),
+    }
+}
+
 /// Prints the last lines of a command: its summary, and the command to run next.
 pub fn print_summary(answer: &Answer) {
     println!("\n{}", answer.summary());
@@ -143,5 +151,12 @@ mod tests {
         assert!(out.lines().count() == 3 && out.lines().all(|line| line.chars().count() <= 100));
         assert_eq!(out.replace("\n  ", " "), text.trim());
         assert_eq!(broken("short"), "short");
+    }
+
+    #[test]
+    fn a_note_has_one_severity() {
+        use crate::logs::finding::Finding;
+        assert_eq!(noted(&Finding::note("short").noted("a.csv")), "note: a.csv: short");
+        assert_eq!(noted(&Finding::problem("short").noted("a.csv")), "problem: a.csv: short");
     }
 }

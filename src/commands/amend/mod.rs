@@ -28,7 +28,7 @@ use crate::commands::intake::{Intake, LogArguments};
 use crate::commands::outputs;
 use crate::commands::per_flight::FitConstantsArguments;
 use crate::commands::status::IN_DOUBT;
-use crate::commands::terminal::print_summary;
+use crate::commands::terminal::{noted, print_summary};
 use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::physics::catalogue;
@@ -242,7 +242,7 @@ fn structures(arguments: &Arguments, model: &GreyBox) -> Result<ExitCode> {
     let effects = wanted(arguments, &effects, model, &taken.flights)?;
     let all = leave_one_out::structures(model, &effects, arguments.per_flight.asked());
     let done = leave_one_out::run(model, &taken.flights, &all, Some(&json), overwrite)?;
-    taken.notes.iter().for_each(|note| println!("note: {note}"));
+    taken.notes.iter().for_each(|note| println!("{}", noted(note)));
     Ok(if taken.in_doubt { ExitCode::from(IN_DOUBT) } else { done })
 }
 

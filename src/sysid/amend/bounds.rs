@@ -41,7 +41,7 @@ pub fn at_bounds(model: &GreyBox, parameters: &[Parameter]) -> Vec<String> {
 /// What to do about the coefficient `name` that ended at zero. Only a control derivative depends on the sign of a control.
 fn remedy(name: &str) -> String {
     let (id, short) = name.split_once('.').unwrap_or(("", name));
-    if ["de", "da", "dr", "throttle"].iter().any(|control| short.ends_with(control)) {
+    if ["de", "da", "dr", "throttle"].into_iter().any(|control| short.ends_with(control)) {
         return "check the sign of that control in the mapping".into();
     }
     let stated = parameters::describe(id).and_then(|(about, _)| about.entry);
