@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use greylag::report::{AmendmentReport, write_new};
+use greylag::sysid::amend::Prior;
 
 fn main() -> anyhow::Result<()> {
     let out = std::env::args_os().nth(1).context("say where: amendment_sample OUT.html")?;
@@ -17,6 +18,7 @@ fn main() -> anyhow::Result<()> {
         held_out: None,
         model_files: vec!["params/x8/prior.toml".into(), "amended/model.toml".into()],
         log_files: vec!["train-1.csv".into(), "train-2.csv".into()],
+        prior: Prior::File,
         command_line: "amendment_sample OUT.html".into(),
         versions: Vec::new(),
     };

@@ -16,7 +16,7 @@ use crate::commands::intake::{Intake, LogArguments};
 use crate::commands::outputs;
 use crate::commands::predictions;
 use crate::commands::status::IN_DOUBT;
-use crate::commands::terminal::{Tone, painted, print_answer, print_summary, table};
+use crate::commands::terminal::{Tone, noted, painted, print_answer, print_summary, table};
 use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::report::ComparisonReport;
@@ -255,7 +255,7 @@ fn print(comparison: &Comparison) {
     for flight in &comparison.flights {
         flight.notes.iter().for_each(|note| println!("{}: {note}", flight.name));
     }
-    comparison.notes.iter().for_each(|note| println!("note: {note}"));
+    comparison.notes.iter().for_each(|note| println!("{}", noted(note)));
     print_summary(&comparison.answer);
 }
 

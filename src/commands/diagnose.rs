@@ -19,7 +19,7 @@ use crate::commands::intake::{Intake, LogArguments};
 use crate::commands::outputs;
 use crate::commands::per_flight::PerFlightArguments;
 use crate::commands::status::IN_DOUBT;
-use crate::commands::terminal::{self, NORMAL_95, print_answer, print_summary};
+use crate::commands::terminal::{self, NORMAL_95, noted, print_answer, print_summary};
 use crate::model::GreyBox;
 use crate::report::DiagnosisReport;
 use crate::sysid::amend::{Diagnosed, diagnosed};
@@ -219,7 +219,7 @@ fn print(diagnosis: &Diagnosis) {
     for advice in &diagnosis.advice {
         println!("fly {}: {}", advice.manoeuvre, advice.why);
     }
-    diagnosis.notes.iter().for_each(|note| println!("note: {note}"));
+    diagnosis.notes.iter().for_each(|note| println!("{}", noted(note)));
 }
 
 fn table<const N: usize>(header: [&str; N]) -> Table {

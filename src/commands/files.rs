@@ -107,8 +107,8 @@ pub fn write(path: &Path, content: &str, overwrite: Overwrite) -> Result<()> {
     writable(path, overwrite)?;
     if is_stdout(Some(path)) {
         return match std::io::stdout().write_all(content.as_bytes()) {
-            // the reader has closed the pipe, as in `greylag … | head`
-            Err(error) if error.kind() == ErrorKind::BrokenPipe => std::process::exit(0),
+            // the reader has closed the pipe, as in `greylag … | head`; other files may follow
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
             written => written.context("cannot write to standard output"),
         };
     }

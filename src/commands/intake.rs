@@ -88,7 +88,7 @@ impl Intake {
     fn add(&mut self, flight: Reconstruction, name: &str, findings: &[Finding]) {
         self.flights.push(flight);
         self.in_doubt |= findings.iter().any(|f| f.severity == Severity::Problem);
-        self.notes.extend(findings.iter().map(|f| format!("{name}: {f}")));
+        self.notes.extend(findings.iter().map(|f| f.noted(name)));
     }
 
     /// Gives all flights the constants of the sensors' installation that only some of them show. `places` has the file of each

@@ -1,5 +1,8 @@
 //! Subcommands of `greylag`: their arguments, and the calls that carry them out.
 
+#[macro_use]
+mod console;
+
 mod aircraft;
 #[cfg(feature = "study")]
 mod amend;
@@ -78,9 +81,7 @@ mod workbench;
 #[cfg(feature = "study")]
 use std::ffi::OsString;
 use std::io::IsTerminal;
-
-use std::panic;
-use std::process::{self, ExitCode};
+use std::process::ExitCode;
 use std::sync::LazyLock;
 
 use anyhow::Result;
@@ -191,23 +192,6 @@ enum Command {
     Workbench(workbench::Arguments),
 }
 
-/// Ends the program if a text cannot be printed: silently if the output pipe is closed, as in `greylag … | head`, otherwise
-/// with one line on standard error and status 1. `println!` panics in both cases.
-fn end_with_the_output() {
-    let usual = panic::take_hook();
-    panic::set_hook(Box::new(move |about| {
-        let text = about.payload_as_str().unwrap_or_default();
-        let Some(cause) = text.strip_prefix("failed printing to stdout: ") else {
-            return usual(about);
-        };
-        if cause.contains("Broken pipe") {
-            process::exit(0);
-        }
-        terminal::complain(format_args!("{}", mistake::no_output(cause)));
-        process::exit(1);
-    }));
-}
-
 /// Parses the command line. An error ends the program.
 fn parse() -> Arguments {
     let line = with_signs(<Arguments as clap::CommandFactory>::command());
@@ -243,10 +227,6 @@ pub fn main() -> ExitCode {
         .with_ansi(std::io::stderr().is_terminal())
         .with_writer(|| log_once::LogOnce);
     tracing_subscriber::registry().with(filter).with(lines).init();
-    // a flight must continue when the program that reads its output ends
-    if !matches!(command, Command::Fly(_)) {
-        end_with_the_output();
-    }
     run(command).unwrap_or_else(|error| {
         if error.chain().any(|cause| cause.is::<Cancelled>()) {
             eprintln!("greylag: stopped by Ctrl-C; nothing was written");

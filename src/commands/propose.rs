@@ -15,6 +15,7 @@ use crate::commands::given;
 use crate::commands::intake::{Intake, LogArguments};
 use crate::commands::outputs;
 use crate::commands::status::IN_DOUBT;
+use crate::commands::terminal::noted;
 use crate::sysid::diagnose::{Options, Proposal, Rung, propose};
 use crate::sysid::flight_path::ActuatorClock;
 
@@ -143,7 +144,7 @@ fn print(proposal: &Proposal) {
     if let Some(free) = proposal.free.as_ref().filter(|f| !f.front.is_empty()) {
         println!("\nfree forms, the best of each size\n{}", front(&free.front, "evidence"));
     }
-    proposal.notes.iter().for_each(|note| println!("note: {note}"));
+    proposal.notes.iter().for_each(|note| println!("{}", noted(note)));
 }
 
 /// Table of the best formulas, one row for each size. `evidence` is the heading of the column with the evidence.

@@ -93,8 +93,8 @@ pub fn broken(text: &str) -> String {
     lines.join("\n")
 }
 
-/// Prints a line to standard output. It does nothing if the reader has closed the output. `println!` would panic then, and
-/// a panic of the main thread ends the flight.
+/// Prints a line to standard output and ignores all errors. `println!` would end the program on a full disk, and the flight
+/// with it.
 pub fn say(line: Arguments<'_>) {
     let _ = writeln!(io::stdout(), "{line}");
 }
@@ -117,6 +117,14 @@ pub fn print_answer(answer: &Answer) {
     lines.next().into_iter().for_each(|first| println!("{}", painted(first, tone)));
     lines.for_each(|line| println!("{line}"));
     println!();
+}
+
+/// The line of a note of a result. It begins with one word of severity.
+pub fn noted(note: &str) -> String {
+    match ["note: ", "warning: ", "problem: "].iter().any(|word| note.starts_with(*word)) {
+        true => note.to_owned(),
+        false => format!("note: {note}"),
+    }
 }
 
 /// Prints the last lines of a command: its summary, and the command to run next.
@@ -143,5 +151,12 @@ mod tests {
         assert!(out.lines().count() == 3 && out.lines().all(|line| line.chars().count() <= 100));
         assert_eq!(out.replace("\n  ", " "), text.trim());
         assert_eq!(broken("short"), "short");
+    }
+
+    #[test]
+    fn a_note_has_one_severity() {
+        use crate::logs::finding::Finding;
+        assert_eq!(noted(&Finding::note("short").noted("a.csv")), "note: a.csv: short");
+        assert_eq!(noted(&Finding::problem("short").noted("a.csv")), "problem: a.csv: short");
     }
 }

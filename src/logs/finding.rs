@@ -173,14 +173,29 @@ fn choices_named(finding: Finding, entries: &BTreeMap<String, Entry>, format: Fo
     Finding { text, ..finding }
 }
 
-impl std::fmt::Display for Finding {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let word = match self.severity {
+impl Severity {
+    fn word(self) -> &'static str {
+        match self {
             Severity::Note => "note",
             Severity::Warning => "warning",
             Severity::Problem => "problem",
-        };
-        write!(f, "{word}: {}", self.text)
+        }
+    }
+}
+
+impl Finding {
+    /// The text with the name of its log, as one of the notes of a result. Only a warning or a problem begins with its severity.
+    pub fn noted(&self, log: &str) -> String {
+        match self.severity {
+            Severity::Note => format!("{log}: {}", self.text),
+            severity => format!("{}: {log}: {}", severity.word(), self.text),
+        }
+    }
+}
+
+impl std::fmt::Display for Finding {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}", self.severity.word(), self.text)
     }
 }
 

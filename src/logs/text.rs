@@ -14,7 +14,7 @@ use super::phases::Flying;
 use super::quality::Quality;
 use super::stretches::Keep;
 use super::topics::period_s;
-use super::{Flight, Format, Sample, assess, derive, screening};
+use super::{Flight, Format, Sample, assess, derive, quoted, screening};
 
 /// Reads the flights of a CSV table, one for each recording in it.
 ///
@@ -59,10 +59,9 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
     let several = missing.len() > 1;
     if several && to == Use::Look {
         findings.push(lacks(path, &missing, &raw.unknown_columns));
-    } else if let Some(first) = missing.into_iter().next() {
-        if to == Use::Compute {
-            return Err(LogError::Csv { error: first, hint: String::new() });
-        }
+    } else if to == Use::Compute && lacking {
+        return Err(LogError::Csv { error: refused(missing), hint: String::new() });
+    } else if let [first] = &missing[..] {
         findings.push(Finding::problem(first.to_string()));
     }
     let (mut made, entries) = (std::mem::take(&mut raw.notes), std::mem::take(&mut raw.entries));
@@ -133,8 +132,11 @@ fn settled(
 /// Largest number of column names in a finding.
 const SHOWN: usize = 40;
 
-/// Finding about a table that lacks several columns. It also names columns of the table that are not known.
-fn lacks(path: &Path, missing: &[CsvError], unknown: &[String]) -> Finding {
+/// Largest number of missing columns that an error names after the first.
+const ALSO: usize = 3;
+
+/// The names of the columns of `missing`, each with its alternative.
+fn columns_of(missing: &[CsvError]) -> Vec<String> {
     let either = |column: &str| EITHER.iter().find(|(command, _)| *command == column);
     let named = missing.iter().filter_map(|error| match error {
         CsvError::Column { column, .. } => Some(match either(column) {
@@ -143,6 +145,32 @@ fn lacks(path: &Path, missing: &[CsvError], unknown: &[String]) -> Finding {
         }),
         _ => None,
     });
+    named.collect()
+}
+
+/// The error about a table that lacks the columns `missing`, of which there is at least one.
+fn refused(mut missing: Vec<CsvError>) -> CsvError {
+    let (path, column, remedy) = match missing.remove(0) {
+        CsvError::Column { path, column, remedy } => (path, column, remedy),
+        other => return other,
+    };
+    let mut also = columns_of(&missing);
+    let more = also.len().saturating_sub(ALSO);
+    also.truncate(ALSO);
+    let also = match (also.len(), more) {
+        (0, _) => String::new(),
+        (_, 0) => format!("; it also lacks {}", also.join(", ")),
+        _ => format!("; it also lacks {} and {more} more", also.join(", ")),
+    };
+    let all = quoted(&path);
+    let remedy = format!(
+        "{remedy}{also}. --mapping FILE takes columns of other names, and `greylag logs info {all}` lists what is there and what is missing"
+    );
+    CsvError::Column { path, column, remedy }
+}
+
+/// Finding about a table that lacks several columns. It also names columns of the table that are not known.
+fn lacks(path: &Path, missing: &[CsvError], unknown: &[String]) -> Finding {
     let shown: Vec<&str> = unknown.iter().take(SHOWN).map(String::as_str).collect();
     let more = if unknown.len() > SHOWN { " …" } else { "" };
     let has = match shown.is_empty() {
@@ -152,7 +180,7 @@ fn lacks(path: &Path, missing: &[CsvError], unknown: &[String]) -> Finding {
     Finding::problem(format!(
         "flight log {} has no column {}: add them, in the units that their names end with, or name the file's own columns in a mapping (--mapping){has}",
         path.display(),
-        named.collect::<Vec<_>>().join(", ")
+        columns_of(missing).join(", ")
     ))
 }
 

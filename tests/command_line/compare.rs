@@ -86,6 +86,11 @@ fn a_bad_log_is_named_and_the_rest_is_compared() {
     let output = greylag(&[&model[..], &["--log", bad, &good]].concat());
     assert_eq!(output.status.code(), Some(3), "{}", text(&output.stderr));
     assert!(text(&output.stdout).contains("left out") && text(&output.stdout).contains("bad.csv"));
+    // the first missing columns and how many there are, and where to see and to mend them, once
+    let said = text(&output.stderr);
+    for words in ["`pitch_rad`", "it also lacks `", " more. --mapping FILE", "greylag logs info "] {
+        assert_eq!(said.matches(words).count(), 1, "{words}: {said}");
+    }
     let output = greylag(&[&model[..], &["--log", bad]].concat());
     assert_eq!(output.status.code(), Some(1));
     assert!(text(&output.stderr).contains("no log can be compared"));

@@ -353,6 +353,38 @@ fn a_reader_that_leaves_is_no_fault() {
     }
 }
 
+/// The reader of both outputs leaves at once, as in `greylag … 2>&1 | head`.
+#[test]
+fn files_are_written_though_the_reader_leaves() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    csv::save(&fly(1, 25.0, REALISTIC), Path::new(&at("a.csv"))).unwrap();
+    for command in ["compare", "diagnose", "amend"] {
+        let [json, page, out] = ["json", "html", "out"].map(|end| at(&format!("{command}.{end}")));
+        let (result, more) = match command {
+            "amend" => {
+                let line = ["--tune-only", "--fit-all", "--accept-anyway", "--out", &out];
+                (format!("{out}/model.toml"), line.to_vec())
+            }
+            _ => (json.clone(), vec!["--json", &json[..]]),
+        };
+        let mut child = Command::new(env!("CARGO_BIN_EXE_greylag"))
+            .args([command, "--model", "params/x8/prior.toml", "--log", &at("a.csv")])
+            .args(more)
+            .args(["--report", &page])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop((child.stdout.take(), child.stderr.take()));
+        let status = child.wait().unwrap();
+        assert!(matches!(status.code(), Some(0 | 3)), "{command}: {status}");
+        for path in [&result, &page] {
+            assert!(fs::metadata(path).is_ok_and(|file| file.len() > 0), "{command}: no {path}");
+        }
+    }
+}
+
 /// `/dev/full` refuses what is written to it, as a full disk does.
 #[test]
 #[cfg(target_os = "linux")]

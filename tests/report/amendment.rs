@@ -3,7 +3,7 @@
 use crate::report_amendment;
 use crate::report_comparison;
 use greylag::report::AmendmentReport;
-use greylag::sysid::amend::Amendment;
+use greylag::sysid::amend::{Amendment, Prior};
 use serde_json::Value;
 
 fn report(amendment: &Amendment) -> AmendmentReport<'_> {
@@ -14,6 +14,7 @@ fn report(amendment: &Amendment) -> AmendmentReport<'_> {
         held_out: None,
         model_files: vec!["prior.toml".into(), "out/model.toml".into()],
         log_files: vec!["train-1.csv".into(), "train-2.csv".into()],
+        prior: Prior::File,
         command_line: "greylag amend".into(),
         versions: Vec::new(),
     }
@@ -56,6 +57,19 @@ fn before_and_after_stand_side_by_side() {
     let with = AmendmentReport { held_out: Some(&comparison), ..report(&amendment) };
     let html = with.page().render();
     assert!(html.contains("Root mean square over the runs") && !html.contains("as given</td>"));
+}
+
+#[test]
+fn an_estimate_at_its_bound_has_no_interval_and_bounds_are_no_prior_to_move_from() {
+    let mut amendment = report_amendment::amendment();
+    let drag = amendment.parameters.iter_mut().find(|p| p.name == "drag_linear.CD0").unwrap();
+    (drag.value, drag.at_bound) = (0.0, true);
+    let html = report(&amendment).page().render();
+    assert!(html.contains(" → 0, at its bound") && !html.contains(" → 0 ±"), "{html}");
+    assert!(html.contains("moved by more than two standard deviations"));
+    let scratch = AmendmentReport { prior: Prior::Bounds, ..report(&amendment) };
+    let html = scratch.page().render();
+    assert!(!html.contains("moved by more than") && html.contains("only within what is possible"));
 }
 
 #[test]

@@ -237,7 +237,7 @@ fn every_number_of_the_box_is_recomputed_from_the_flights() {
     let all = 100.0 * (before.unwrap() / recomputed(&given, &logs[2], &given, 5.0).0 - 1.0);
     assert!((numbers["change_percent"].as_f64().unwrap() - all).abs() < 1e-3, "{numbers} {all}");
 
-    // one model alone stands beside the best forecast without aerodynamics
+    // one model alone stands beside the best forecast without aerodynamics that has not seen the flight
     let json = scratch.path().join("alone.json");
     let flags = ["--recorded-clock", "--json", json.to_str().unwrap()];
     greylag(&[&["compare", "--model", MODEL, "--log", log(2)][..], &flags].concat());
@@ -245,6 +245,7 @@ fn every_number_of_the_box_is_recomputed_from_the_flights() {
     all_in_json(&alone["answer"]);
     let baseline = &alone["answer"]["numbers"]["baseline"];
     let (name, told) = (baseline["name"].as_str().unwrap(), baseline["error"].as_f64().unwrap());
+    assert!(["hold the state", "fly straight on"].contains(&name), "{baseline}");
     for forecast in ["hold the state", "fly straight on"] {
         let error = without_aerodynamics(&logs[2], &given, forecast);
         assert!(told <= error * (1.0 + 1e-9), "{baseline}: {forecast} {error}");

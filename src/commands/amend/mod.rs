@@ -5,6 +5,7 @@
 mod bounds;
 mod given;
 mod leave_one_out;
+mod page;
 mod places;
 mod tables;
 mod unasserted;
@@ -27,18 +28,16 @@ use crate::commands::intake::{Intake, LogArguments};
 use crate::commands::outputs;
 use crate::commands::per_flight::FitConstantsArguments;
 use crate::commands::status::IN_DOUBT;
-use crate::commands::terminal::print_summary;
+use crate::commands::terminal::{noted, print_summary};
 use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::physics::catalogue;
-use crate::report::AmendmentReport;
 use crate::sysid::amend::document::{MODEL, STORY};
-use crate::sysid::amend::{self, Added, Amended, Amendment, Prior, Refused};
-use crate::sysid::compare::{self, Answer, compare};
+use crate::sysid::amend::{self, Added, Amendment, Prior, Refused};
 use crate::sysid::diagnose::{self, diagnose};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
-use crate::sysid::progress::{Progress, Stage, part};
+use crate::sysid::progress::{Stage, part};
 
 /// File name of the errors that `--leave-one-out` finds.
 const LEAVE_ONE_OUT: &str = "leave-one-out.json";
@@ -142,7 +141,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let answer = amended.amendment.answer.clone().then(next(&arguments.logs.among(&used), &places));
     // the page is drawn before any file is written, so that Ctrl-C during the drawing leaves no file behind
     let results = (&places, &answer);
-    let draw = || page(arguments, &model, &amended, &tests, results, &part(&on_stage, drawing));
+    let draw =
+        || page::page(arguments, &model, &amended, &tests, results, &part(&on_stage, drawing));
     let drawn = match &arguments.report {
         Some(path) if !all_refused && kept.is_none() => Some((path, draw()?)),
         _ => None,
@@ -242,7 +242,7 @@ fn structures(arguments: &Arguments, model: &GreyBox) -> Result<ExitCode> {
     let effects = wanted(arguments, &effects, model, &taken.flights)?;
     let all = leave_one_out::structures(model, &effects, arguments.per_flight.asked());
     let done = leave_one_out::run(model, &taken.flights, &all, Some(&json), overwrite)?;
-    taken.notes.iter().for_each(|note| println!("note: {note}"));
+    taken.notes.iter().for_each(|note| println!("{}", noted(note)));
     Ok(if taken.in_doubt { ExitCode::from(IN_DOUBT) } else { done })
 }
 
@@ -278,35 +278,6 @@ fn tests(
         return Ok(taken.flights.clone());
     }
     held_out::validation(&arguments.logs, held, (model, ActuatorClock::AsRecorded), taken)
-}
-
-/// The report as HTML, with the errors of open-loop simulations of the validation flights over the simulated time.
-fn page(
-    arguments: &Arguments,
-    model: &GreyBox,
-    amended: &Amended,
-    tests: &[Reconstruction],
-    (places, answer): (&Places, &Answer),
-    progress: &Progress,
-) -> Result<String> {
-    let mut models = [model.clone(), amended.tuned.clone(), amended.model.clone()];
-    models[1].name = format!("{}-tuned", model.name);
-    let held_out = compare(&models, tests, &compare::Options::default(), progress)?;
-    let paths = arguments.logs.paths.iter().chain(&arguments.hold_out);
-    let report = AmendmentReport {
-        title: format!("{} amended", model.name),
-        amendment: &amended.amendment,
-        answer: Some(answer),
-        held_out: Some(&held_out),
-        model_files: vec![
-            arguments.model.display().to_string(),
-            places.model().display().to_string(),
-        ],
-        log_files: paths.map(|p| p.display().to_string()).collect(),
-        command_line: files::command_line(),
-        versions: vec![("greylag".into(), env!("CARGO_PKG_VERSION").into())],
-    };
-    Ok(report.page().render())
 }
 
 /// Logs for the fit and logs for validation. With `--fit-all` all logs are for both.

@@ -3,7 +3,7 @@
 
 use comfy_table::Table;
 
-use crate::commands::terminal::{NORMAL_95, print_answer, table, whole_names};
+use crate::commands::terminal::{NORMAL_95, noted, print_answer, table, whole_names};
 use crate::sysid::amend::{Amendment, FittedFlight, Parameter};
 use crate::sysid::compare::{Answer, HorizonScore};
 
@@ -16,7 +16,7 @@ pub fn print(story: &Amendment, answer: &Answer) {
         println!("{}", own_table(&story.flights));
     }
     story.sentences.iter().for_each(|sentence| println!("{sentence}"));
-    story.notes.iter().for_each(|note| println!("note: {note}"));
+    story.notes.iter().for_each(|note| println!("{}", noted(note)));
 }
 
 fn parameter_table(parameters: &[Parameter]) -> Table {

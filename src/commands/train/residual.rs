@@ -14,6 +14,7 @@ use crate::commands::held_out;
 use crate::commands::intake::LogArguments;
 use crate::commands::outputs;
 use crate::commands::status::IN_DOUBT;
+use crate::commands::terminal::noted;
 use crate::learn::dynamics::export;
 use crate::logs::quoted;
 use crate::model::GreyBox;
@@ -69,7 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let clock = ActuatorClock::Estimated;
     let mut taken = arguments.logs.of(fit.clone()).take_in(&model, clock)?;
     let tests = held_out::validation(&arguments.logs, held.clone(), (&model, clock), &mut taken)?;
-    taken.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    taken.notes.iter().for_each(|note| eprintln!("{}", noted(note)));
     let slowest = model.airframe.envelope.flying_from_mps();
     let parts = parts(&taken.flights);
     let prepared: Vec<Prepared> =

@@ -3,7 +3,7 @@
 pub(super) mod page;
 
 use crate::Page;
-use greylag_sysid::amend::Amendment;
+use greylag_sysid::amend::{Amendment, Prior};
 use greylag_sysid::compare::{Answer, Comparison};
 
 /// Result of an amendment and its provenance.
@@ -22,6 +22,8 @@ pub struct AmendmentReport<'a> {
     pub model_files: Vec<String>,
     /// Paths of the log files, as given.
     pub log_files: Vec<String>,
+    /// Prior knowledge of the coefficients that the fit used.
+    pub prior: Prior,
     /// The command line that ran the amendment.
     pub command_line: String,
     /// Names and versions or hashes of further programs or files.

@@ -33,7 +33,7 @@ pub fn amendment_page(report: &AmendmentReport) -> Page {
     sections.push(added(a));
     sections.push(effects(a));
     sections.push(in_words(a));
-    sections.push(tables::tuned(&tuned(a), Method::OutputError));
+    sections.push(tables::tuned(&tuned(a), &bounded(a), report.prior, Method::OutputError));
     sections.push(sensors(a).folded());
     sections.push(notes(a).folded());
     sections.push(provenance(report).folded());
@@ -134,7 +134,8 @@ fn added(a: &Amendment) -> Section {
     for p in a.parameters.iter().filter(|p| p.added) {
         let bound = if p.at_bound { " (at a bound of what is possible)" } else { "" };
         let what = format!("{}{bound}", p.meaning);
-        table.push([p.name.clone(), number(p.value), interval(p.ci95[0], p.ci95[1]), what]);
+        let ends = if p.at_bound { "none".into() } else { interval(p.ci95[0], p.ci95[1]) };
+        table.push([p.name.clone(), number(p.value), ends, what]);
         if !p.by_flight.is_empty() {
             let apart = suspects::disagreement(p.by_flight.iter().map(|f| [f.value, f.sd]));
             single.push((apart, Figure::Whiskers(by_flight(p))));
@@ -168,6 +169,12 @@ fn tuned(a: &Amendment) -> Vec<Tuned> {
         sd: p.sd,
     })
     .collect()
+}
+
+/// Names of the coefficients whose estimate is at a bound. Such an estimate has no interval, because its standard deviation is that
+/// of a fit without bounds.
+fn bounded(a: &Amendment) -> Vec<&str> {
+    a.parameters.iter().filter(|p| p.at_bound).map(|p| p.name.as_str()).collect()
 }
 
 fn sensors(a: &Amendment) -> Section {

@@ -63,7 +63,7 @@ pub(crate) fn baselines(c: &Comparison) -> Section {
         true => Section::default(),
         false => Section::new(
             "Forecasts without aerodynamics",
-            "They know no aerodynamics: a model has to beat them.",
+            "They know no aerodynamics: a model has to beat those that were not fitted to these flights.",
             vec![Figure::Table(table)],
         ),
     }

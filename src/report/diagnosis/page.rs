@@ -10,6 +10,7 @@ use crate::{
     AnswerBox, BarGroup, Bars, Choice, ChoiceOption, Figure, Finding, Findings, First, Grid,
     GridCell, GridRow, Link, Page, Section, Style, Table,
 };
+use greylag_sysid::amend::Prior;
 use greylag_sysid::compare::answer::Method;
 use greylag_sysid::compare::{ChannelId, ChannelResult, Comparison, ModelResult, RegimeVariable};
 use greylag_sysid::diagnose::{Diagnosis, Verdict};
@@ -52,7 +53,7 @@ pub fn diagnosis_page(report: &DiagnosisReport) -> Page {
     sections.extend(report.held_out.map(proof::stated));
     sections.push(tables::advice(report));
     sections.push(tables::unseen(d).folded());
-    sections.push(tables::tuned(&d.tuned, Method::EquationError));
+    sections.push(tables::tuned(&d.tuned, &[], Prior::File, Method::EquationError));
     sections.push(tables::measurement(d).folded());
     sections.push(tables::trims(d).folded());
     sections.push(tables::candidates(d).folded());

@@ -8,6 +8,7 @@ use crate::diagnosis::DiagnosisReport;
 use crate::kit::numbers::{NORMAL_95, evidence, interval, number, percent};
 use crate::{Figure, Finding, Findings, Section, Style, Table, Whisker, Whiskers};
 use greylag_logs::quoted;
+use greylag_sysid::amend::Prior;
 use greylag_sysid::compare::answer::Method;
 use greylag_sysid::diagnose::{Advice, Candidate, Diagnosis, Tuned};
 
@@ -57,8 +58,8 @@ pub(crate) fn unseen(d: &Diagnosis) -> Section {
 /// The re-estimated coefficients of the model with their values in the model file (priors). The largest changes, in standard
 /// deviations of the prior, come first.
 ///
-/// `method` is the method of the fit.
-pub(crate) fn tuned(tuned: &[Tuned], method: Method) -> Section {
+/// `bounded` names the coefficients whose value is at a bound. `prior` and `method` are those of the fit.
+pub(crate) fn tuned(tuned: &[Tuned], bounded: &[&str], prior: Prior, method: Method) -> Section {
     if tuned.is_empty() {
         return Section::default();
     }
@@ -71,29 +72,40 @@ pub(crate) fn tuned(tuned: &[Tuned], method: Method) -> Section {
         scale: crate::Scale::Linear,
         lines: vec![-2.0, 0.0, 2.0],
         legend: "dashed: the prior and ± 2".into(),
-        rows: sorted.iter().map(|t| tuned_row(t)).collect(),
+        rows: sorted.iter().map(|t| tuned_row(t, bounded.contains(&t.name.as_str()))).collect(),
     };
     let far = sorted.iter().filter(|t| pull(t) > 2.0).count();
-    let note = format!(
-        "The model's own coefficients were fitted along by {}, held near their values in the file as \
-         strongly as the file says they are known. {} of {} moved by more than two standard \
-         deviations.",
-        method.name(),
-        if far == 0 { "None".into() } else { far.to_string() },
-        sorted.len()
-    );
+    let note = match prior {
+        Prior::File => format!(
+            "The model's own coefficients were fitted along by {}, held near their values in the file as \
+             strongly as the file says they are known. {} of {} moved by more than two standard \
+             deviations.",
+            method.name(),
+            if far == 0 { "None".into() } else { far.to_string() },
+            sorted.len()
+        ),
+        Prior::Bounds => format!(
+            "The model's own coefficients were fitted by {}, held only within what is possible.",
+            method.name()
+        ),
+    };
     Section::new("Tuned coefficients", &note, vec![Figure::Whiskers(figure)])
 }
 
-fn tuned_row(t: &Tuned) -> Whisker {
+/// `bounded` states whether the value is at a bound; it then has no interval.
+fn tuned_row(t: &Tuned, bounded: bool) -> Whisker {
     let scaled = |x: f64| (x - t.prior) / t.prior_sd;
     let half = NORMAL_95 * t.sd;
+    let error = if bounded { ", at its bound".into() } else { format!(" ± {}", number(half)) };
     Whisker {
         label: t.name.clone(),
         style: if scaled(t.value).abs() > 2.0 { Style::Command } else { Style::Actual },
         value: scaled(t.value),
-        interval: [scaled(t.value - half), scaled(t.value + half)],
-        text: format!("{} → {} ± {}", number(t.prior), number(t.value), number(half)),
+        interval: match bounded {
+            true => [f64::NAN; 2],
+            false => [scaled(t.value - half), scaled(t.value + half)],
+        },
+        text: format!("{} → {}{error}", number(t.prior), number(t.value)),
     }
 }
 

@@ -109,4 +109,13 @@ mod tests {
         assert_eq!(widths, ["100.00", "0.00", "0.00", "0.00"]);
         assert!(html.contains("250 %") && html.contains("cannot be determined"));
     }
+
+    #[test]
+    fn a_long_text_takes_no_width_from_its_bar() {
+        let css = include_str!("assets/page.css");
+        assert!(css.contains("\n.bars .value { flex: none; width: "));
+        assert!(
+            !css.contains(".bars .value { min-width") && css.contains(".bars .track { flex: 1;")
+        );
+    }
 }

@@ -21,8 +21,9 @@ pub fn at_bounds(model: &GreyBox, parameters: &[Parameter]) -> Vec<String> {
         let (bound, cure) = cure(model, &p.name, p.value)?;
         let advice = match cure {
             Cure::Zero => format!(
-                "the flights give the opposite sign or do not determine it apart from other coefficients; check the sign of that control in \
-                 the mapping, or hold {} by a smaller sd in the model file",
+                "the flights give the opposite sign or do not determine it apart from other coefficients; {}, or hold {} by a \
+                 smaller sd in the model file",
+                remedy(&p.name),
                 p.name
             ),
             Cure::WrongSign => "a sign that it hardly has on an aircraft. The data are wrong or do not determine it apart from \
@@ -35,6 +36,24 @@ pub fn at_bounds(model: &GreyBox, parameters: &[Parameter]) -> Vec<String> {
         Some(format!("{} ends at its bound {bound}: {advice}", p.name))
     };
     ended.filter_map(one).collect()
+}
+
+/// What to do about the coefficient `name` that ended at zero. Only a control derivative depends on the sign of a control.
+fn remedy(name: &str) -> String {
+    let (id, short) = name.split_once('.').unwrap_or(("", name));
+    if ["de", "da", "dr", "throttle"].into_iter().any(|control| short.ends_with(control)) {
+        return "check the sign of that control in the mapping".into();
+    }
+    let stated = parameters::describe(id).and_then(|(about, _)| about.entry);
+    let motion = match stated.map_or("", |entry| entry.separated_by) {
+        "" if short == "CD0" => "glides and level flight at several airspeeds",
+        "" if short.ends_with('q') => "elevator doublets",
+        "" if short.ends_with('p') => "aileron doublets",
+        "" if short.ends_with('r') => "rudder doublets, or turns to both sides",
+        "" => "manoeuvres that move each input and the angles of attack and sideslip, one by one",
+        stated => stated,
+    };
+    format!("fly {motion}")
 }
 
 /// The argument of the option `--bound` that lifts the bound at which the coefficient `name` of `model` ended with `value`. `None`
@@ -73,6 +92,18 @@ fn cure(model: &GreyBox, name: &str, value: f64) -> Option<(f64, Cure)> {
 mod tests {
     use super::*;
     use std::path::Path;
+
+    #[test]
+    fn the_sign_of_a_control_is_blamed_for_control_derivatives_alone() {
+        for name in ["pitch_linear.Cmde", "roll_linear.Clda", "rudder_linear.Cndr"] {
+            assert!(remedy(name).contains("sign of that control"), "{name}");
+        }
+        assert_eq!(remedy("pitch_linear.Cmq"), "fly elevator doublets");
+        assert_eq!(remedy("roll_linear.Clp"), "fly aileron doublets");
+        assert_eq!(remedy("drag_linear.CD0"), "fly glides and level flight at several airspeeds");
+        assert!(remedy("drag_beta2.CDbeta2").contains("skids"));
+        assert!(remedy("lift_linear.CLalpha").contains("angles of attack"));
+    }
 
     #[test]
     fn only_the_side_at_which_a_fit_ended_is_lifted_and_no_sign_is_allowed_that_is_not_physical() {

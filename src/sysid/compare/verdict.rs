@@ -59,7 +59,8 @@ fn diverges(scores: &[HorizonScore]) -> Option<String> {
     })
 }
 
-/// A warning if a forecast without aerodynamics is better than the model at the longest horizon that a run reaches.
+/// A warning if a forecast without aerodynamics, not fitted to the flights, is better than the model at the longest horizon that a
+/// run reaches.
 pub fn beaten(free_run: &[HorizonScore], forecasts: &[ForecastResult]) -> Option<String> {
     let reached = free_run.iter().filter(|s| s.runs > 0 && s.rmse_scaled.is_finite());
     let score = reached.max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s))?;
@@ -68,7 +69,8 @@ pub fn beaten(free_run: &[HorizonScore], forecasts: &[ForecastResult]) -> Option
         let there = f.free_run.iter().find(|s| s.horizon_s == horizon)?;
         (there.rmse_scaled < score.rmse_scaled).then_some((there.rmse_scaled, f.name))
     };
-    let (error, name) = forecasts.iter().filter_map(at).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let references = forecasts.iter().filter(|f| f.is_reference());
+    let (error, name) = references.filter_map(at).min_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(format!(
         "A forecast without aerodynamics is better than the model {horizon} s ahead: \u{201c}{name}\u{201d} errs by {error:.3} \
          of the reference scale, the model by {:.3}.",
