@@ -8,7 +8,9 @@ use anyhow::{Result, bail};
 
 use super::check;
 use super::new::{self, Common};
+use crate::commands::amend::{self, Caller};
 use crate::commands::files::{self, Overwrite};
+use crate::commands::held_out;
 use crate::commands::intake::LogArguments;
 use crate::commands::terminal::{NORMAL_95, print_next};
 use crate::commands::{Command, command_of, given};
@@ -59,24 +61,26 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let made = [folder, &prior].map(|path| !path.exists());
     // Ctrl-C while the logs are read leaves the prior, with which the same command begins again
     let left = prior.join("model.toml").exists();
-    let model = new::files_again(&prior, &measures.airframe(), &measures.model())?;
+    let prior_file = new::files_again(&prior, &measures.airframe(), &measures.model())?;
     let fitted = folder.join("model.toml");
     let mut line: Vec<OsString> =
         ["amend", "--from-scratch", "--tune-only", "--model"].map(Into::into).into();
-    line.push(model.into());
+    line.push(prior_file.clone().into());
     line.push("--log".into());
     line.extend(logs.paths.iter().map(|log| log.clone().into_os_string()));
     line.extend(logs.reading_words());
     line.extend(["--out".into(), folder.clone().into_os_string()]);
     line.extend(["--report".into(), folder.join("fit.html").into_os_string()]);
     let Command::Amend(amend) = command_of(&line)? else { bail!("greylag amend cannot be run") };
-    let status = crate::commands::amend::run(&amend).inspect_err(|_| {
+    let status = amend::run_for(&amend, Caller::FromLog).inspect_err(|_| {
         if !left {
             remove(folder, &prior, made);
         }
     })?;
     if !fitted.exists() {
         println!("the model estimated from the dimensions is in {}", prior.display());
+        println!("to write the fit all the same: {}", anyway(folder, logs));
+        print_next(&format!("greylag compare --model {}{}", quoted(&prior_file), judges(logs)));
         return Ok(status);
     }
     let page = folder.join("aircraft.html");
@@ -85,6 +89,23 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     println!("wrote {} and {}", page.display(), folder.join("fit.html").display());
     next(folder, &fitted, logs)?;
     Ok(status)
+}
+
+/// The command that writes a fit that is not written otherwise, with its page.
+fn anyway(folder: &Path, logs: &LogArguments) -> String {
+    format!(
+        "greylag amend --from-scratch --tune-only --accept-anyway --model {}{} --out {} --report {}",
+        quoted(&folder.join("prior/model.toml")),
+        logs.words(),
+        quoted(folder),
+        quoted(&folder.join("fit.html"))
+    )
+}
+
+/// The logs that judge a model, as words of a command line: those held out, or the single log.
+fn judges(logs: &LogArguments) -> String {
+    let (fitted, held) = held_out::divided(&logs.paths, &[]);
+    logs.of(if held.is_empty() { fitted } else { held }).words()
 }
 
 /// Removes the files that a failed run wrote, so that the user can run the corrected command. `made` states whether the run
@@ -205,6 +226,17 @@ mod tests {
         assert!(command.contains(" --bound drag_linear.CD0=0..1 --out "), "{command}");
         let words: Vec<OsString> = command.split(' ').skip(1).map(OsString::from).collect();
         assert!(matches!(command_of(&words), Ok(Command::Amend(_))), "{command}");
+    }
+
+    #[test]
+    fn the_commands_after_a_fit_that_is_not_written_are_accepted() {
+        let logs = Line::parse_from(["greylag", "--log", "a.csv", "b.csv"]).logs;
+        let command = anyway(Path::new("own"), &logs);
+        let words: Vec<OsString> = command.split(' ').skip(1).map(OsString::from).collect();
+        assert!(command.contains("--accept-anyway --model own/prior/model.toml"), "{command}");
+        assert!(matches!(command_of(&words), Ok(Command::Amend(_))), "{command}");
+        assert_eq!(judges(&logs), " --log b.csv");
+        assert_eq!(judges(&Line::parse_from(["greylag", "--log", "a.csv"]).logs), " --log a.csv");
     }
 
     #[test]

@@ -6,6 +6,7 @@
 
 pub mod acting;
 pub(super) mod between;
+mod fitted;
 mod numbers;
 mod words;
 

@@ -121,6 +121,9 @@ pub struct Numbers {
     pub fitted_flights: Option<usize>,
     /// Whether the flights are the last third of a flight to whose first two thirds the model was fitted.
     pub last_third: bool,
+    /// Whether the fit had no prior but the bounds, so that it cannot be repeated from scratch.
+    #[serde(skip)]
+    pub from_scratch: bool,
     /// The models, from the given model to the last model; empty if no horizon is reached.
     pub steps: Vec<Step>,
     /// Change of the error from the first to the last model, %; NaN (null) for a single model.
@@ -174,6 +177,7 @@ impl Numbers {
                 Seen::LastThird => Some(0),
             },
             last_third: subject.seen == Seen::LastThird,
+            from_scratch: false,
             change_percent,
             baseline,
             effects: subject.effects.clone(),

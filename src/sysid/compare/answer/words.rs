@@ -35,12 +35,15 @@ fn behind(n: &Numbers, baseline: &Baseline, first: &Step, rest: &[Step]) -> Stri
         _ => format!(",{} {}", by(n, step), number(step.error)),
     };
     format!(
-        "The model is {}: {begin} at {} s is {}{}. Check axes, signs and units of the logs, fly more and richer manoeuvres, \
-         or fit it from scratch.",
+        "The model is {}: {begin} at {} s is {}{}. Check axes, signs and units of the logs, {}.",
         worse_than(baseline),
         number(n.horizon_s),
         number(first.error),
-        rest.iter().map(at).collect::<String>()
+        rest.iter().map(at).collect::<String>(),
+        match n.from_scratch {
+            true => "or fly more and richer manoeuvres",
+            false => "fly more and richer manoeuvres, or fit it from scratch",
+        }
     )
 }
 
