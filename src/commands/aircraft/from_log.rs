@@ -120,8 +120,8 @@ fn remove(folder: &Path, prior: &Path, made: [bool; 2]) {
     };
 }
 
-/// Prints manoeuvres for the coefficients that the flights do not determine, and the next command: a diagnosis of the model
-/// `fitted` on the fitted `logs`.
+/// Prints manoeuvres for the coefficients that the flights do not determine, the command that judges the model `fitted`, and the
+/// next command: a diagnosis of this model on those of the `logs` that were fitted.
 fn next(folder: &Path, fitted: &Path, logs: &LogArguments) -> Result<()> {
     let text = std::fs::read_to_string(folder.join("amend.json"))?;
     let story: serde_json::Value = serde_json::from_str(&text)?;
@@ -149,9 +149,26 @@ fn next(folder: &Path, fitted: &Path, logs: &LogArguments) -> Result<()> {
     if let Some(command) = lift(folder, &story, logs)? {
         println!("to lift the bounds at which coefficients ended: {command}");
     }
-    println!("a flight that the fit has not seen judges the model: `greylag compare` with its log");
-    print_next(&format!("greylag diagnose --model {}{}", quoted(fitted), logs.words()));
+    println!("{}", judged(folder, logs));
+    let (fit, _) = held_out::divided(&logs.paths, &[]);
+    print_next(&format!("greylag diagnose --model {}{}", quoted(fitted), logs.of(fit).words()));
     Ok(())
+}
+
+/// Sentence on the flight that judges the fitted model.
+fn judged(folder: &Path, logs: &LogArguments) -> String {
+    let (_, held) = held_out::divided(&logs.paths, &[]);
+    let Some(held) = held.first() else {
+        return "a flight that the fit has not seen judges the model: `greylag compare` with its log"
+            .into();
+    };
+    format!(
+        "{} was held out, so it judges the model: greylag compare --model {} {}{}",
+        held.display(),
+        quoted(&folder.join("prior/model.toml")),
+        quoted(&folder.join("model.toml")),
+        judges(logs)
+    )
 }
 
 /// The command that repeats the fit with the bounds lifted at which coefficients ended; `None` if none should be lifted.
@@ -236,6 +253,11 @@ mod tests {
         assert!(command.contains("--accept-anyway --model own/prior/model.toml"), "{command}");
         assert!(matches!(command_of(&words), Ok(Command::Amend(_))), "{command}");
         assert_eq!(judges(&logs), " --log b.csv");
+        let said = judged(Path::new("own"), &logs);
+        let (_, command) = said.split_once(": greylag ").unwrap();
+        let words: Vec<OsString> = command.split(' ').map(OsString::from).collect();
+        assert!(said.starts_with("b.csv was held out"), "{said}");
+        assert!(matches!(command_of(&words), Ok(Command::Compare(_))), "{said}");
         assert_eq!(judges(&Line::parse_from(["greylag", "--log", "a.csv"]).logs), " --log a.csv");
     }
 
