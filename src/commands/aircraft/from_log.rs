@@ -14,6 +14,7 @@ use crate::commands::held_out;
 use crate::commands::intake::LogArguments;
 use crate::commands::terminal::{NORMAL_95, print_next};
 use crate::commands::{Command, command_of, given};
+use crate::control::aircraft_check;
 use crate::logs::quoted;
 use crate::sysid::amend::lifted;
 
@@ -21,6 +22,8 @@ use crate::sysid::amend::lifted;
 const KNOWN: f64 = 0.3;
 /// Largest ratio of standard deviation to the range of the bounds at which an offset about zero, such as Cl0, counts as determined.
 const OFFSET: f64 = 0.02;
+/// Largest number of findings of the check that are printed.
+const SAID: usize = 3;
 /// Prefixes of coefficient names, each with a manoeuvre that excites the coefficients with this prefix.
 const MANOEUVRES: [(&str, &str); 7] = [
     ("roll_linear", "aileron doublets, then bank to bank reversals"),
@@ -84,10 +87,13 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         return Ok(status);
     }
     let page = folder.join("aircraft.html");
-    let found = check::page(&fitted, &given::model(&fitted)?)?;
-    files::write(&page, &found, Overwrite::New)?;
+    let model = given::model(&fitted)?;
+    let found = aircraft_check::check(&model)?;
+    files::write(&page, &check::page(&fitted, &model)?, Overwrite::New)?;
     println!("wrote {} and {}", page.display(), folder.join("fit.html").display());
-    next(folder, &fitted, logs)?;
+    further(folder, logs)?;
+    found.findings.iter().take(SAID).for_each(|finding| println!("correct: {finding}"));
+    print_next(&next(&fitted, logs, &found.findings));
     Ok(status)
 }
 
@@ -120,9 +126,19 @@ fn remove(folder: &Path, prior: &Path, made: [bool; 2]) {
     };
 }
 
-/// Prints manoeuvres for the coefficients that the flights do not determine, the command that judges the model `fitted`, and the
-/// next command: a diagnosis of this model on those of the `logs` that were fitted.
-fn next(folder: &Path, fitted: &Path, logs: &LogArguments) -> Result<()> {
+/// The next command: the check of the model `fitted` if it has `findings`, otherwise a diagnosis on those of the `logs` that were
+/// fitted.
+fn next(fitted: &Path, logs: &LogArguments, findings: &[String]) -> String {
+    let fitted = quoted(fitted);
+    let (fit, _) = held_out::divided(&logs.paths, &[]);
+    match findings {
+        [] => format!("greylag diagnose --model {fitted}{}", logs.of(fit).words()),
+        _ => format!("greylag aircraft check --model {fitted}"),
+    }
+}
+
+/// Prints manoeuvres for the coefficients that the flights do not determine, and the command that judges the fitted model.
+fn further(folder: &Path, logs: &LogArguments) -> Result<()> {
     let text = std::fs::read_to_string(folder.join("amend.json"))?;
     let story: serde_json::Value = serde_json::from_str(&text)?;
     let unknown = unknown(&story);
@@ -150,8 +166,6 @@ fn next(folder: &Path, fitted: &Path, logs: &LogArguments) -> Result<()> {
         println!("to lift the bounds at which coefficients ended: {command}");
     }
     println!("{}", judged(folder, logs));
-    let (fit, _) = held_out::divided(&logs.paths, &[]);
-    print_next(&format!("greylag diagnose --model {}{}", quoted(fitted), logs.of(fit).words()));
     Ok(())
 }
 
@@ -258,6 +272,10 @@ mod tests {
         let words: Vec<OsString> = command.split(' ').map(OsString::from).collect();
         assert!(said.starts_with("b.csv was held out"), "{said}");
         assert!(matches!(command_of(&words), Ok(Command::Compare(_))), "{said}");
+        let model = Path::new("own/model.toml");
+        let next = |findings: &[String]| next(model, &logs, findings);
+        assert_eq!(next(&[]), "greylag diagnose --model own/model.toml --log a.csv");
+        assert_eq!(next(&["x".into()]), "greylag aircraft check --model own/model.toml");
         assert_eq!(judges(&Line::parse_from(["greylag", "--log", "a.csv"]).logs), " --log a.csv");
     }
 
