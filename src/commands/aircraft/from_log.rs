@@ -275,7 +275,7 @@ mod tests {
         let model = Path::new("own/model.toml");
         let next = |findings: &[String]| next(model, &logs, findings);
         assert_eq!(next(&[]), "greylag diagnose --model own/model.toml --log a.csv");
-        assert_eq!(next(&["x".into()]), "greylag aircraft check --model own/model.toml");
+        assert_eq!(next(&["x".to_owned()]), "greylag aircraft check --model own/model.toml");
         assert_eq!(judges(&Line::parse_from(["greylag", "--log", "a.csv"]).logs), " --log a.csv");
     }
 
