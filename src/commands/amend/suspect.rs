@@ -39,7 +39,7 @@ pub fn without_effect(fitted: &[Parameter]) -> Option<String> {
 fn absurd_thrust(fitted: &[Parameter], weight: f64) -> Option<String> {
     let of = |name: &str| fitted.iter().find(|p| p.name == name).map_or(0.0, |p| p.value);
     let [idle, slope, curvature] = ["propeller.T0_n", "propeller.Tt_n", "propeller.Ttt_n"].map(of);
-    let at_rest = [("without throttle", idle), ("at full throttle", idle + slope + curvature)];
+    let at_rest = [("at full throttle", idle + slope + curvature), ("without throttle", idle)];
     let (throttle, thrust) = at_rest.into_iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
     let ratio = thrust.abs() / weight;
     (ratio > WEIGHTS).then(|| {
