@@ -93,7 +93,7 @@ impl AircraftCheck {
     pub fn named_loops(&self) -> impl Iterator<Item = (&'static str, &LoopMargins)> {
         let Advised { name, loops, .. } = &self.controller;
         let advised = loops.iter().filter(move |_| *name != LQI).map(move |l| (*name, l));
-        self.loops.iter().map(|l| (LQI, l)).chain(advised).filter(|_| self.designed)
+        self.loops.iter().map(|l| (LQI, l)).chain(advised).filter(move |_| self.designed)
     }
 }
 
