@@ -18,7 +18,7 @@ use crate::commands::files::shipped;
 use crate::commands::flown_with::{Chosen, FlownWith};
 use crate::commands::terminal::{complain, say};
 use crate::commands::watchdog;
-use crate::commands::{margin, punctual};
+use crate::commands::{margin, no_vehicle, punctual};
 use crate::control::aircraft_estimate::AircraftEstimator;
 use crate::control::cem::Change;
 use crate::control::envelope::EnvelopeLimiter;
@@ -202,7 +202,7 @@ impl Arguments {
 /// Reads a positive number of seconds.
 fn seconds(text: &str) -> Result<Duration, String> {
     let number = text.parse::<f64>().map_err(|e| e.to_string())?;
-    let duration = Duration::try_from_secs_f64(number).map_err(|e| e.to_string())?;
+    let duration = Duration::try_from_secs_f64(number.max(0.0)).map_err(|e| e.to_string())?;
     if duration.is_zero() { Err("give a time above zero".into()) } else { Ok(duration) }
 }
 
@@ -249,14 +249,18 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     }
     watchdog::feed(flight.rounds.clone());
     announce(arguments, &model, &flight);
-    show_events(&flight, &arguments.vehicle);
+    show_events(&flight, arguments);
     #[cfg(feature = "demo")]
     let recorded = flight.recording.clone();
-    let summary =
+    let mut summary =
         flight.join().context("the control thread has died; the recording holds all up to then")?;
+    no_vehicle::tell(&mut summary);
     say(format_args!("{summary}"));
     #[cfg(feature = "demo")]
-    recorded.iter().for_each(|folder| say(format_args!("next: greylag report {}", quoted(folder))));
+    recorded
+        .iter()
+        .filter(|_| summary.vehicle.states > 0)
+        .for_each(|folder| say(format_args!("next: greylag report {}", quoted(folder))));
     Ok(ExitCode::SUCCESS)
 }
 
@@ -366,10 +370,10 @@ fn announce(arguments: &Arguments, model: &GreyBox, flight: &Flight) {
 }
 
 /// Prints the events of the flight until it ends.
-fn show_events(flight: &Flight, vehicle: &Address) {
+fn show_events(flight: &Flight, arguments: &Arguments) {
     while flight.is_flying() {
         match flight.events.recv_timeout(Duration::from_millis(50)) {
-            Ok(event) => say(format_args!("{}", line(&event, vehicle))),
+            Ok(event) => say(format_args!("{}", line(&event, arguments))),
             Err(RecvTimeoutError::Timeout) => {}
             // The control thread is about to end.
             Err(RecvTimeoutError::Disconnected) => return,
@@ -377,11 +381,11 @@ fn show_events(flight: &Flight, vehicle: &Address) {
     }
 }
 
-fn line(event: &Event, vehicle: &Address) -> String {
+fn line(event: &Event, arguments: &Arguments) -> String {
     match event {
         Event::Text(text) => format!("[{}] {}", severity(text.severity), text.words),
         Event::VehicleFound(peer) => format!("vehicle found at {peer}"),
-        Event::NoVehicle => format!("no vehicle yet on {vehicle}; start one with `cargo sitl`"),
+        Event::NoVehicle => no_vehicle::yet(arguments.profile, &arguments.vehicle),
     }
 }
 

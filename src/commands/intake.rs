@@ -248,7 +248,9 @@ impl Reading {
         let cure: fn(&Path) -> String = if paths.len() > 1 { converted } else { mapped };
         for (k, (path, name)) in paths.iter().zip(logs::names(paths)).enumerate() {
             if !bar::is_silent() {
-                eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, paths.len());
+                let of = format!("log {} of {}: ", k + 1, paths.len());
+                let of = if paths.len() > 1 { of.as_str() } else { "" };
+                eprintln!("{of}reading and reconstructing {name}");
             }
             let read = given::log(path).and_then(|()| {
                 logs::flights(path, &reading).map_err(|e| units_first(path, cure, e))

@@ -52,6 +52,7 @@ mod margin;
 mod mistake;
 #[cfg(feature = "demo")]
 mod mystery;
+mod no_vehicle;
 #[cfg(feature = "study")]
 mod per_flight;
 mod predictions;

@@ -105,10 +105,12 @@ pub fn complain(line: Arguments<'_>) {
 }
 
 /// Prints the short answer of a command in up to three lines, before its other output. The first line is green if the
-/// prediction error falls, and red if it rises or a forecast without aerodynamics is better.
+/// prediction error falls, and red if it rises or a forecast without aerodynamics is better. It has no colour if a fitted model
+/// is hardly better than such a forecast.
 pub fn print_answer(answer: &Answer) {
     let tone = match answer.numbers.change_percent {
         _ if answer.behind_baseline() => Tone::Bad,
+        p if p <= -0.05 && answer.gains_nothing() => Tone::Plain,
         p if p <= -0.05 => Tone::Good,
         p if p >= 0.05 => Tone::Bad,
         _ => Tone::Plain,

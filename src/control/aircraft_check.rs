@@ -19,6 +19,8 @@ const USUAL_DELAY: f64 = 0.04;
 const LEVEL_WITHIN_MPS: f64 = 0.01;
 /// Smallest steady roll rate at full aileron without a finding, rad/s (about 20°/s).
 const SLOW_ROLL: f64 = 0.35;
+/// Pitch acceleration at full elevator below which the elevator has no effect, rad/s².
+const NO_PITCH: f64 = 0.01;
 
 /// Steady straight flight at one airspeed. If level flight is not possible, it is a descent at full throttle or at idle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -33,6 +35,13 @@ pub struct Level {
     pub throttle: f64,
     /// Flight-path angle, rad, positive above the horizon.
     pub path: f64,
+}
+
+impl Level {
+    /// Whether elevator and throttle are within their travel, so that the aircraft can fly so.
+    pub fn is_possible(&self) -> bool {
+        self.elevator.abs() <= 1.0 && (0.0..=1.0).contains(&self.throttle)
+    }
 }
 
 /// Name of the LQI in the registry of controllers.
@@ -72,17 +81,19 @@ pub struct AircraftCheck {
     pub authority: Authority,
     /// Stability margins of each loop of the LQI with default weights at the cruise airspeed.
     pub loops: Vec<LoopMargins>,
+    /// Whether an LQI can be designed over the envelope. If not, no controller is recommended.
+    pub designed: bool,
     /// Findings to correct before a flight, most severe first.
     pub findings: Vec<String>,
 }
 
 impl AircraftCheck {
     /// The loops of the LQI, then those of the recommended controller if it is another one. Each comes with the name of its
-    /// controller.
+    /// controller. Empty if no controller can be designed.
     pub fn named_loops(&self) -> impl Iterator<Item = (&'static str, &LoopMargins)> {
         let Advised { name, loops, .. } = &self.controller;
         let advised = loops.iter().filter(move |_| *name != LQI).map(move |l| (*name, l));
-        self.loops.iter().map(|l| (LQI, l)).chain(advised)
+        self.loops.iter().map(|l| (LQI, l)).chain(advised).filter(move |_| self.designed)
     }
 }
 
@@ -110,6 +121,7 @@ pub fn check(model: &GreyBox) -> Result<AircraftCheck, CheckError> {
     let speeds =
         (0..SPEEDS).map(|i| envelope.airspeed_min_mps + span * i as f64 / (SPEEDS - 1) as f64);
     let loops = lqi::margins(model, cruise, &Weights::DEFAULT)?;
+    let design = build(ControllerKind::Lqi, model).map(drop);
     let mut check = AircraftCheck {
         levels: speeds.clone().filter_map(|v| level(model, v, altitude)).collect(),
         modes: modes(model, cruise, altitude)?,
@@ -117,9 +129,11 @@ pub fn check(model: &GreyBox) -> Result<AircraftCheck, CheckError> {
         controller: advised(model, &loops)?,
         authority: Authority::at(model, &trim, altitude),
         loops,
+        designed: design.is_ok(),
         findings: Vec::new(),
     };
     check.findings = findings(model, &check, speeds.count());
+    check.findings.extend(design.err().map(|why| undesigned(&why)));
     Ok(check)
 }
 
@@ -163,40 +177,75 @@ fn level(model: &GreyBox, airspeed: f64, altitude: f64) -> Option<Level> {
     Some(Level { airspeed, alpha, elevator, throttle, path: trim.path() })
 }
 
-/// Findings on straight flight at one airspeed.
-fn findings_in_level(model: &GreyBox, level: &Level) -> Vec<String> {
+/// The smallest and the largest of `values` with `places` decimal places, or the only one.
+fn range(values: impl Iterator<Item = f64> + Clone, places: usize) -> String {
+    let least = format!("{:.places$}", values.clone().fold(f64::INFINITY, f64::min));
+    let most = format!("{:.places$}", values.fold(f64::NEG_INFINITY, f64::max));
+    if least == most { least } else { format!("{least} to {most}") }
+}
+
+/// Findings on straight flight over the airspeeds, one for each cause.
+fn findings_in_levels(model: &GreyBox, levels: &[Level]) -> Vec<String> {
     let mut out = Vec::new();
-    let Level { airspeed, elevator, throttle, path, .. } = *level;
-    if elevator.abs() > MUCH_TRAVEL {
+    let strained = levels.iter().filter(|l| l.elevator.abs() > MUCH_TRAVEL);
+    if strained.clone().next().is_some() {
         out.push(format!(
-            "straight flight at {airspeed:.1} m/s takes {:.0} % of the elevator's travel: move the \
-             centre of gravity or correct Cm0, Cmalpha and Cmde",
-            100.0 * elevator.abs()
+            "straight flight at {} m/s takes {} % of the elevator's travel: move the centre of gravity or correct Cm0, \
+             Cmalpha and Cmde",
+            range(strained.clone().map(|l| l.airspeed), 1),
+            range(strained.map(|l| 100.0 * l.elevator.abs()), 0)
         ));
     }
     // above the cruise airspeed, a descent at full throttle is no fault
-    let cruises = airspeed <= model.airframe.envelope.airspeed_cruise_mps;
-    if cruises && throttle == 1.0 && path < 0.0 {
+    let cruise = model.airframe.envelope.airspeed_cruise_mps;
+    let sinks = |l: &&Level| l.airspeed <= cruise && l.throttle == 1.0 && l.path < 0.0;
+    let sinking = levels.iter().filter(sinks);
+    if sinking.clone().next().is_some() {
         out.push(format!(
-            "full throttle does not hold level flight at {airspeed:.1} m/s: it descends by {:.1} degrees; correct \
-             thrust, drag or the envelope",
-            -path.to_degrees()
+            "full throttle does not hold level flight at {} m/s: it descends by {} degrees; correct thrust, drag or the \
+             envelope",
+            range(sinking.clone().map(|l| l.airspeed), 1),
+            range(sinking.map(|l| -l.path.to_degrees()), 1)
+        ));
+    }
+    let braked = levels.iter().filter(|l| !(0.0..=1.0).contains(&l.throttle));
+    if braked.clone().next().is_some() {
+        out.push(format!(
+            "straight flight at {} m/s takes {} % of throttle, which is impossible: correct thrust and drag",
+            range(braked.clone().map(|l| l.airspeed), 1),
+            range(braked.map(|l| 100.0 * l.throttle), 0)
         ));
     }
     out
 }
 
-/// All findings as sentences, with the most severe first.
+/// Finding on the surfaces that act against their sign; `None` if there are none.
+fn reversed(authority: &Authority) -> Option<String> {
+    let Authority { roll_rate, pitch_acceleration, yaw_acceleration } = *authority;
+    let surfaces = [
+        (roll_rate < 0.0, "positive aileron must roll right (Clda)"),
+        (pitch_acceleration > 0.0, "positive elevator must pitch down (Cmde)"),
+        (yaw_acceleration.is_some_and(|y| y > 0.0), "positive rudder must yaw left (Cndr)"),
+    ];
+    let said: Vec<&str> = surfaces.iter().filter(|(wrong, _)| *wrong).map(|(_, s)| *s).collect();
+    let verb = if said.len() > 1 {
+        "surfaces act against their sign"
+    } else {
+        "a surface acts against its sign"
+    };
+    (!said.is_empty()).then(|| format!("{verb}: {}; correct the sign", said.join(", ")))
+}
+
+/// Finding that no LQI can be designed for the reason `why`.
+fn undesigned(why: &SetupError) -> String {
+    let by_envelope = matches!(why, SetupError::Design { .. });
+    let remedy = "; give the envelope less bank or a pitch_min_deg nearer to 0";
+    format!("{why}{}", if by_envelope { remedy } else { "" })
+}
+
+/// All findings except on the design of the LQI as sentences, with the most severe first.
 fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String> {
-    let mut out = Vec::new();
-    let Authority { roll_rate, pitch_acceleration, yaw_acceleration } = check.authority;
-    if roll_rate < 0.0 || pitch_acceleration > 0.0 || yaw_acceleration.is_some_and(|y| y > 0.0) {
-        out.push(
-            "a surface acts against its sign: positive aileron must roll right, positive elevator pitch \
-             down, positive rudder yaw left; correct Clda, Cmde or Cndr"
-                .into(),
-        );
-    }
+    let mut out: Vec<String> = reversed(&check.authority).into_iter().collect();
     let missing = speeds - check.levels.len();
     if missing > 0 {
         out.push(format!(
@@ -204,20 +253,18 @@ fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String
              airspeed_min_mps and airspeed_max_mps"
         ));
     }
-    check.levels.iter().for_each(|level| out.extend(findings_in_level(model, level)));
+    out.extend(findings_in_levels(model, &check.levels));
+    if check.authority.pitch_acceleration.abs() < NO_PITCH {
+        out.push("the elevator has no effect: correct Cmde".into());
+    }
     if check.authority.roll_rate.abs() < SLOW_ROLL {
         out.push(format!(
             "full aileron rolls at {:.0} deg/s only: correct Clda or Clp",
             check.authority.roll_rate.to_degrees().abs()
         ));
     }
-    if let Err(why) = build(ControllerKind::Lqi, model) {
-        let remedy = "; give the envelope less bank or a pitch_min_deg nearer to 0";
-        let by_envelope = matches!(why, SetupError::Design { .. });
-        out.push(format!("{why}{}", if by_envelope { remedy } else { "" }));
-    }
     let Advised { name, delay_s, .. } = check.controller;
-    if delay_s < USUAL_DELAY {
+    if check.designed && delay_s < USUAL_DELAY {
         out.push(format!(
             "the loops of {name} tolerate {:.0} ms of delay, sensors, link and servos have up to {:.0} ms: make the link \
              faster, or correct Clda, Cmde or the inertia",

@@ -9,6 +9,7 @@ mod due;
 mod setpoint_authority;
 mod outbox;
 mod parameters;
+mod refusals;
 mod session;
 mod setpoints;
 mod streams;
@@ -27,6 +28,7 @@ use super::wire::telemetry::Home;
 pub use counts::ClientCounts;
 use greylag_physics::Time;
 use outbox::Outbox;
+use refusals::Refusals;
 use session::{Session, Stay};
 use setpoint_authority::SetpointAuthority;
 use setpoints::OTHER_SETPOINT;
@@ -88,6 +90,7 @@ pub struct Clients {
     counts: ClientCounts,
     next_summary: Duration,
     bad_at_summary: u64,
+    refusals: Refusals,
 }
 
 impl Clients {
@@ -109,6 +112,7 @@ impl Clients {
             counts: ClientCounts::default(),
             next_summary: Duration::ZERO,
             bad_at_summary: 0,
+            refusals: Refusals::default(),
         }
     }
 
@@ -313,8 +317,10 @@ impl Clients {
         self.sessions[at].say(severity, words, self.text_id, self.identity, &mut self.outbox);
     }
 
-    /// Queues a warning for the client of the session with index `at`, unless it has had too many recently.
+    /// Queues a warning for the client of the session with index `at`, unless it has had too many recently. The first warning
+    /// of each kind is also logged.
     fn complain(&mut self, now: Now, at: usize, words: &str) {
+        self.refusals.log(words);
         if self.sessions[at].may_complain(now.host) {
             self.say(at, Severity::Warning, words);
         }

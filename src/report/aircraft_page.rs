@@ -34,7 +34,7 @@ impl AircraftReport<'_> {
     /// Builds the page from these contents.
     pub fn page(&self) -> Page {
         let airframe = &self.model.airframe;
-        let sections = vec![
+        let mut sections = vec![
             Section::verdict(self.verdict()),
             Section::new("Three views", SKETCH_NOTE, vec![Figure::Drawing(sketch(self.model))]),
             Section::new(
@@ -48,13 +48,16 @@ impl AircraftReport<'_> {
                 "Of straight flight at the cruise airspeed.",
                 vec![Figure::Table(self.modes())],
             ),
-            Section::new(
+        ];
+        if self.check.designed {
+            sections.push(Section::new(
                 "Stability margins",
                 "Change of gain, phase lag and delay that each loop tolerates. A controller tolerates the least of its delays.",
                 vec![Figure::Table(self.loops())],
-            ),
-            Section::new("Provenance", "", vec![Figure::Table(self.provenance())]).folded(),
-        ];
+            ));
+        }
+        let provenance = vec![Figure::Table(self.provenance())];
+        sections.push(Section::new("Provenance", "", provenance).folded());
         Page {
             title: format!("{}: how it flies", airframe.name),
             subtitle: format!(
@@ -69,11 +72,14 @@ impl AircraftReport<'_> {
 
     fn verdict(&self) -> Verdict {
         let AircraftCheck { findings, level_up_to, controller, .. } = self.check;
-        let mut details = vec![format!(
-            "Controller to begin with: {}; its loops tolerate {:.0} ms of delay (stability margins below).",
-            controller.name,
-            1e3 * controller.delay_s
-        )];
+        let advice = || {
+            format!(
+                "Controller to begin with: {}; its loops tolerate {:.0} ms of delay (stability margins below).",
+                controller.name,
+                1e3 * controller.delay_s
+            )
+        };
+        let mut details: Vec<String> = self.check.designed.then(advice).into_iter().collect();
         details.extend(level_up_to.map(|v| {
             format!(
                 "It cannot fly level above {} m/s: faster is a descent at full throttle.",
@@ -109,7 +115,7 @@ impl AircraftReport<'_> {
         let AircraftCheck { levels, level_up_to, .. } = self.check;
         let envelope = self.model.airframe.envelope;
         let to = number(level_up_to.unwrap_or(envelope.airspeed_max_mps));
-        match levels.iter().find(|l| is_level(l)) {
+        match levels.iter().find(|l| is_level(l) && l.is_possible()) {
             Some(slowest) => {
                 format!("It flies level from {} to {to} m/s.", number(slowest.airspeed))
             }
@@ -134,8 +140,11 @@ impl AircraftReport<'_> {
             let [alpha, path] = [l.alpha, l.path].map(f64::to_degrees);
             let row = [l.airspeed, alpha, 100.0 * l.elevator, 100.0 * l.throttle];
             let row = row.map(|x| format!("{x:.1}").replace('-', "−"));
-            let path =
-                if is_level(l) { "level".into() } else { format!("{path:.1}").replace('-', "−") };
+            let path = match is_level(l) {
+                _ if !l.is_possible() => "impossible".into(),
+                true => "level".into(),
+                false => format!("{path:.1}").replace('-', "−"),
+            };
             table.push(row.into_iter().chain([path]));
         }
         table

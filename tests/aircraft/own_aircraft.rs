@@ -139,11 +139,17 @@ fn mass_span_area_and_logs_make_a_model_that_predicts_another_flight() {
     ]);
     let said = text(&made.stdout);
     assert!(matches!(made.status.code(), Some(0 | 3)), "{said}{}", text(&made.stderr));
-    let next = said.trim_end().lines().last().unwrap();
-    assert_eq!(
-        next,
-        format!("next: greylag diagnose --model {}/model.toml --log {a} {b}", folder.display())
+    // the flight that was held out stays unseen: it is in no fit and in no diagnosis
+    let next: Vec<&str> = said.lines().filter(|line| line.starts_with("next: ")).collect();
+    let own = folder.display();
+    let diagnosed = format!("next: greylag diagnose --model {own}/model.toml --log {a}");
+    let checked = format!("next: greylag aircraft check --model {own}/model.toml");
+    // what the check finds comes first
+    assert_eq!(next, [if said.contains("correct: ") { checked } else { diagnosed }]);
+    let judges = format!(
+        "{b} was held out, so it judges the model: greylag compare --model {own}/prior/model.toml {own}/model.toml --log {b}"
     );
+    assert!(said.contains(&judges), "{said}");
     assert!(fs::read_to_string(folder.join("aircraft.html")).unwrap().contains("<svg"));
     assert!(folder.join("fit.html").exists());
     let found = scratch.path().join("found.json");

@@ -44,6 +44,23 @@ fn a_reversed_surface_and_a_weak_motor_are_said() {
     assert!(wrong.set_coefficient("thrust_table.k", 0.25));
     let said = check(&wrong).unwrap().findings.join("\n");
     assert!(said.contains("Clda") && said.contains("throttle"), "{said}");
+    // only the surface that is reversed is named
+    assert!(!said.contains("elevator must") && !said.contains("rudder must"), "{said}");
+}
+
+/// An elevator that is much too weak: each cause is one line, and the trims beyond its travel are not possible.
+#[test]
+fn a_cause_at_many_airspeeds_is_one_finding() {
+    let mut weak = model("params/aerosonde/jsbsim.toml");
+    assert!(weak.set_coefficient("pitch_linear.Cmde", -0.02));
+    let found = check(&weak).unwrap();
+    let travel = found.findings.iter().filter(|f| f.contains("of the elevator's travel")).count();
+    assert_eq!(travel, 1, "{:?}", found.findings);
+    assert!(found.levels.iter().any(|l| !l.is_possible()), "{:?}", found.levels);
+    // a controller is recommended only if one can be designed
+    let undesigned = found.findings.iter().any(|f| f.contains("cannot design"));
+    assert_eq!(found.designed, !undesigned, "{:?}", found.findings);
+    assert_eq!(found.named_loops().count() > 0, found.designed);
 }
 
 #[test]

@@ -128,6 +128,7 @@ fn arguments_that_make_no_sense_are_refused() {
         (["--controller", "magic"], "pid-retuned"),
         (["--vehicle", "14600"], "udpin:HOST:PORT"),
         (["--duration-s", "0"], "above zero"),
+        (["--duration-s", "-4"], "above zero"),
         (["--plan-deadline-ms", "0"], "1..=1000"),
     ] {
         let output = fly(folder.path(), &arguments).output().unwrap();
@@ -234,6 +235,26 @@ fn a_duration_ends_the_flight_by_itself() {
     let said = String::from_utf8(output.stdout).unwrap();
     assert!(output.status.success() && said.contains("flew 0.5 s: 0 states"), "{said}");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn without_a_vehicle_no_recording_stays_and_none_is_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = [
+        "--vehicle",
+        "udpin:127.0.0.1:0",
+        "--client",
+        "tcpin:127.0.0.1:0",
+        "--controller",
+        "lqi",
+        "--duration-s",
+        "0.5",
+    ];
+    let output = fly(folder.path(), &arguments).output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success() && said.contains("no vehicle was seen"), "{said}");
+    assert!(!said.contains("next: "), "{said}");
+    assert_eq!(std::fs::read_dir(folder.path().join("flights")).unwrap().count(), 0);
 }
 
 real_time::tests!(a_flight_is_announced_told_summed_up_and_recorded_until_ctrl_c,);

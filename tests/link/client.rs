@@ -771,7 +771,11 @@ fn each_kind_of_input_that_cannot_be_used_is_logged() {
             spoil(&mut clients, &mut double, &level());
             clients.poll(at_ms(0), &mut double);
         });
-        assert!(lines.len() == 1 && lines[0].contains(field), "{field}: {lines:?}");
+        let (said, summary): (Vec<_>, Vec<_>) =
+            lines.iter().partition(|line| line.contains("told a client: "));
+        assert!(summary.len() == 1 && summary[0].contains(field), "{field}: {lines:?}");
+        // the client has the cause as a text, and so has the log
+        assert_eq!(said.len(), usize::from(field.contains("setpoints")), "{field}: {lines:?}");
     }
     let (mut clients, mut double) = new();
     let lines = Log::of(|| {
@@ -785,6 +789,7 @@ fn each_kind_of_input_that_cannot_be_used_is_logged() {
 fn a_flood_of_bad_input_is_logged_once_in_ten_seconds() {
     let (mut clients, mut double) = new();
     let mut lines = vec![];
+    let mut told = vec![];
     for ms in (0..40_000).step_by(10) {
         // Bad input for 15 s; the line at 20 s is of what came after the one at 10 s.
         let said = Log::of(|| {
@@ -794,8 +799,12 @@ fn a_flood_of_bad_input_is_logged_once_in_ten_seconds() {
             clients.poll(at_ms(ms), &mut double);
         });
         sent(&mut clients);
-        lines.extend(said.into_iter().map(|line| (ms, line)));
+        let (words, summary): (Vec<_>, Vec<_>) =
+            said.into_iter().partition(|line| line.contains("told a client: "));
+        told.extend(words);
+        lines.extend(summary.into_iter().map(|line| (ms, line)));
     }
+    assert!(matches!(&told[..], [once] if once.contains("Setpoint refused: ")), "{told:?}");
     assert_eq!(lines.iter().map(|(ms, _)| *ms).collect::<Vec<_>>(), [0, 10_000, 20_000]);
     assert!(lines[2].1.contains("refused_setpoints=1500"), "{}", lines[2].1);
 }

@@ -58,7 +58,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             model.airframe.reference.altitude
         );
         print(&found);
-        print_next(&next(&arguments.model, &found));
+        let next = next(&arguments.model, &found);
+        print_next(&match found.findings.is_empty() {
+            true => next,
+            false => corrected(&arguments.model, &next),
+        });
     }
     let document = Document { model: &model.name, airframe: &model.airframe.name, found: &found };
     arguments.json.write("greylag.aircraft-check/1", &document, Overwrite::New)?;
@@ -107,6 +111,11 @@ fn next(file: &Path, found: &AircraftCheck) -> String {
     }
 }
 
+/// The next step with findings: the file to edit, and the command `next` after that.
+fn corrected(file: &Path, next: &str) -> String {
+    format!("correct {} or its airframe file, then run {next}", file.display())
+}
+
 /// Whether `greylag amend` fitted coefficients in the model file to flights. It notes this in their sources.
 fn is_fitted(file: &Path) -> bool {
     std::fs::read_to_string(shipped(file)).is_ok_and(|text| text.contains("; fitted to "))
@@ -126,17 +135,21 @@ pub fn print(found: &AircraftCheck) {
             yaw.to_degrees()
         ))
     );
-    println!("\n{}", loops(found));
+    if found.designed {
+        println!("\n{}", loops(found));
+    }
     println!();
     if let Some(fastest) = found.level_up_to {
         println!("cannot fly level above {fastest:.1} m/s: faster is a descent at full throttle");
     }
     let controller = &found.controller;
-    println!(
-        "controller to begin with: {}, whose loops tolerate {:.0} ms of delay",
-        controller.name,
-        1e3 * controller.delay_s
-    );
+    if found.designed {
+        println!(
+            "controller to begin with: {}, whose loops tolerate {:.0} ms of delay",
+            controller.name,
+            1e3 * controller.delay_s
+        );
+    }
     match found.findings.is_empty() {
         true => println!("nothing to correct by its own numbers; no flight was compared"),
         false => found.findings.iter().for_each(|finding| println!("correct: {finding}")),
@@ -160,6 +173,7 @@ fn levels(found: &AircraftCheck) -> Table {
             format!("{:.0}", 100.0 * l.elevator),
             format!("{:.0}", 100.0 * l.throttle),
             format!("{:.1}", l.path.to_degrees()),
+            if l.is_possible() { String::new() } else { "impossible".into() },
         ]
     });
     table(
@@ -169,6 +183,7 @@ fn levels(found: &AircraftCheck) -> Table {
             "elevator, %",
             "throttle, %",
             "flight path, deg",
+            "",
         ],
         rows,
     )
@@ -216,4 +231,25 @@ fn loops(found: &AircraftCheck) -> Table {
         "delay, ms",
     ];
     table(&header, rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An aircraft whose elevator and ailerons have almost no effect, as a fit may leave them.
+    #[test]
+    fn what_is_to_be_corrected_ends_with_the_file() {
+        let mut model = given::model(Path::new("params/aerosonde/jsbsim.toml")).unwrap();
+        assert!(model.set_coefficient("pitch_linear.Cmde", -0.02));
+        let found = aircraft_check::check(&model).unwrap();
+        let file = Path::new("own/model.toml");
+        let next = next(file, &found);
+        let said = corrected(file, &next);
+        assert_eq!(
+            said,
+            "correct own/model.toml or its airframe file, then run greylag aircraft check --model own/model.toml"
+        );
+        assert!(levels(&found).to_string().contains("impossible"), "{}", levels(&found));
+    }
 }

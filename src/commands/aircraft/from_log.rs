@@ -8,10 +8,13 @@ use anyhow::{Result, bail};
 
 use super::check;
 use super::new::{self, Common};
+use crate::commands::amend::{self, Caller};
 use crate::commands::files::{self, Overwrite};
+use crate::commands::held_out;
 use crate::commands::intake::LogArguments;
 use crate::commands::terminal::{NORMAL_95, print_next};
 use crate::commands::{Command, command_of, given};
+use crate::control::aircraft_check;
 use crate::logs::quoted;
 use crate::sysid::amend::lifted;
 
@@ -19,6 +22,8 @@ use crate::sysid::amend::lifted;
 const KNOWN: f64 = 0.3;
 /// Largest ratio of standard deviation to the range of the bounds at which an offset about zero, such as Cl0, counts as determined.
 const OFFSET: f64 = 0.02;
+/// Largest number of findings of the check that are printed.
+const SAID: usize = 3;
 /// Prefixes of coefficient names, each with a manoeuvre that excites the coefficients with this prefix.
 const MANOEUVRES: [(&str, &str); 7] = [
     ("roll_linear", "aileron doublets, then bank to bank reversals"),
@@ -59,32 +64,54 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let made = [folder, &prior].map(|path| !path.exists());
     // Ctrl-C while the logs are read leaves the prior, with which the same command begins again
     let left = prior.join("model.toml").exists();
-    let model = new::files_again(&prior, &measures.airframe(), &measures.model())?;
+    let prior_file = new::files_again(&prior, &measures.airframe(), &measures.model())?;
     let fitted = folder.join("model.toml");
     let mut line: Vec<OsString> =
         ["amend", "--from-scratch", "--tune-only", "--model"].map(Into::into).into();
-    line.push(model.into());
+    line.push(prior_file.clone().into());
     line.push("--log".into());
     line.extend(logs.paths.iter().map(|log| log.clone().into_os_string()));
     line.extend(logs.reading_words());
     line.extend(["--out".into(), folder.clone().into_os_string()]);
     line.extend(["--report".into(), folder.join("fit.html").into_os_string()]);
     let Command::Amend(amend) = command_of(&line)? else { bail!("greylag amend cannot be run") };
-    let status = crate::commands::amend::run(&amend).inspect_err(|_| {
+    let status = amend::run_for(&amend, Caller::FromLog).inspect_err(|_| {
         if !left {
             remove(folder, &prior, made);
         }
     })?;
     if !fitted.exists() {
         println!("the model estimated from the dimensions is in {}", prior.display());
+        println!("to write the fit all the same: {}", anyway(folder, logs));
+        print_next(&format!("greylag compare --model {}{}", quoted(&prior_file), judges(logs)));
         return Ok(status);
     }
     let page = folder.join("aircraft.html");
-    let found = check::page(&fitted, &given::model(&fitted)?)?;
-    files::write(&page, &found, Overwrite::New)?;
+    let model = given::model(&fitted)?;
+    let found = aircraft_check::check(&model)?;
+    files::write(&page, &check::page(&fitted, &model)?, Overwrite::New)?;
     println!("wrote {} and {}", page.display(), folder.join("fit.html").display());
-    next(folder, &fitted, logs)?;
+    further(folder, logs)?;
+    found.findings.iter().take(SAID).for_each(|finding| println!("correct: {finding}"));
+    print_next(&next(&fitted, logs, &found.findings));
     Ok(status)
+}
+
+/// The command that writes a fit that is not written otherwise, with its page.
+fn anyway(folder: &Path, logs: &LogArguments) -> String {
+    format!(
+        "greylag amend --from-scratch --tune-only --accept-anyway --model {}{} --out {} --report {}",
+        quoted(&folder.join("prior/model.toml")),
+        logs.words(),
+        quoted(folder),
+        quoted(&folder.join("fit.html"))
+    )
+}
+
+/// The logs that judge a model, as words of a command line: those held out, or the single log.
+fn judges(logs: &LogArguments) -> String {
+    let (fitted, held) = held_out::divided(&logs.paths, &[]);
+    logs.of(if held.is_empty() { fitted } else { held }).words()
 }
 
 /// Removes the files that a failed run wrote, so that the user can run the corrected command. `made` states whether the run
@@ -99,9 +126,19 @@ fn remove(folder: &Path, prior: &Path, made: [bool; 2]) {
     };
 }
 
-/// Prints manoeuvres for the coefficients that the flights do not determine, and the next command: a diagnosis of the model
-/// `fitted` on the fitted `logs`.
-fn next(folder: &Path, fitted: &Path, logs: &LogArguments) -> Result<()> {
+/// The next command: the check of the model `fitted` if it has `findings`, otherwise a diagnosis on those of the `logs` that were
+/// fitted.
+fn next(fitted: &Path, logs: &LogArguments, findings: &[String]) -> String {
+    let fitted = quoted(fitted);
+    let (fit, _) = held_out::divided(&logs.paths, &[]);
+    match findings {
+        [] => format!("greylag diagnose --model {fitted}{}", logs.of(fit).words()),
+        _ => format!("greylag aircraft check --model {fitted}"),
+    }
+}
+
+/// Prints manoeuvres for the coefficients that the flights do not determine, and the command that judges the fitted model.
+fn further(folder: &Path, logs: &LogArguments) -> Result<()> {
     let text = std::fs::read_to_string(folder.join("amend.json"))?;
     let story: serde_json::Value = serde_json::from_str(&text)?;
     let unknown = unknown(&story);
@@ -128,9 +165,24 @@ fn next(folder: &Path, fitted: &Path, logs: &LogArguments) -> Result<()> {
     if let Some(command) = lift(folder, &story, logs)? {
         println!("to lift the bounds at which coefficients ended: {command}");
     }
-    println!("a flight that the fit has not seen judges the model: `greylag compare` with its log");
-    print_next(&format!("greylag diagnose --model {}{}", quoted(fitted), logs.words()));
+    println!("{}", judged(folder, logs));
     Ok(())
+}
+
+/// Sentence on the flight that judges the fitted model.
+fn judged(folder: &Path, logs: &LogArguments) -> String {
+    let (_, held) = held_out::divided(&logs.paths, &[]);
+    let Some(held) = held.first() else {
+        return "a flight that the fit has not seen judges the model: `greylag compare` with its log"
+            .into();
+    };
+    format!(
+        "{} was held out, so it judges the model: greylag compare --model {} {}{}",
+        held.display(),
+        quoted(&folder.join("prior/model.toml")),
+        quoted(&folder.join("model.toml")),
+        judges(logs)
+    )
 }
 
 /// The command that repeats the fit with the bounds lifted at which coefficients ended; `None` if none should be lifted.
@@ -205,6 +257,26 @@ mod tests {
         assert!(command.contains(" --bound drag_linear.CD0=0..1 --out "), "{command}");
         let words: Vec<OsString> = command.split(' ').skip(1).map(OsString::from).collect();
         assert!(matches!(command_of(&words), Ok(Command::Amend(_))), "{command}");
+    }
+
+    #[test]
+    fn the_commands_after_a_fit_that_is_not_written_are_accepted() {
+        let logs = Line::parse_from(["greylag", "--log", "a.csv", "b.csv"]).logs;
+        let command = anyway(Path::new("own"), &logs);
+        let words: Vec<OsString> = command.split(' ').skip(1).map(OsString::from).collect();
+        assert!(command.contains("--accept-anyway --model own/prior/model.toml"), "{command}");
+        assert!(matches!(command_of(&words), Ok(Command::Amend(_))), "{command}");
+        assert_eq!(judges(&logs), " --log b.csv");
+        let said = judged(Path::new("own"), &logs);
+        let (_, command) = said.split_once(": greylag ").unwrap();
+        let words: Vec<OsString> = command.split(' ').map(OsString::from).collect();
+        assert!(said.starts_with("b.csv was held out"), "{said}");
+        assert!(matches!(command_of(&words), Ok(Command::Compare(_))), "{said}");
+        let model = Path::new("own/model.toml");
+        let next = |findings: &[String]| next(model, &logs, findings);
+        assert_eq!(next(&[]), "greylag diagnose --model own/model.toml --log a.csv");
+        assert_eq!(next(&["x".to_owned()]), "greylag aircraft check --model own/model.toml");
+        assert_eq!(judges(&Line::parse_from(["greylag", "--log", "a.csv"]).logs), " --log a.csv");
     }
 
     #[test]

@@ -3,10 +3,12 @@
 //! An effect is a term of the equations of motion from the catalogue. A diagnosis asserts the effects that it finds missing.
 
 mod bounds;
+mod caller;
 mod given;
 mod leave_one_out;
 mod page;
 mod places;
+mod suspect;
 mod tables;
 mod unasserted;
 
@@ -15,6 +17,8 @@ use std::process::ExitCode;
 
 use anyhow::{Result, bail};
 
+pub use caller::Caller;
+use page::page;
 use places::{Made, Places, hashed};
 use tables::print;
 
@@ -28,7 +32,7 @@ use crate::commands::intake::{Intake, LogArguments};
 use crate::commands::outputs;
 use crate::commands::per_flight::FitConstantsArguments;
 use crate::commands::status::IN_DOUBT;
-use crate::commands::terminal::{noted, print_summary};
+use crate::commands::terminal::noted;
 use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::physics::catalogue;
@@ -111,6 +115,11 @@ pub struct Arguments {
 /// Reads the logs, reconstructs the flight paths and fits the model. Prints the prediction errors before and after the fit, and
 /// writes the model.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    run_for(arguments, Caller::Amend)
+}
+
+/// The same as [`run`], for the command `caller`.
+pub fn run_for(arguments: &Arguments, caller: Caller) -> Result<ExitCode> {
     let path = shipped(&arguments.model);
     let overwrite = arguments.force.into();
     let model = bounds::given(read::model(&arguments.model)?, &arguments.bounds)?;
@@ -125,7 +134,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     check_new(&effects, &model)?;
     let (paths, held) = divided(arguments);
     let (logs, hold_out) = (hashed(&paths)?, hashed(&held)?);
-    let mut taken = arguments.logs.of(paths).take_in(&model, ActuatorClock::AsRecorded)?;
+    let fitted = arguments.logs.of(paths);
+    let mut taken = fitted.take_in(&model, ActuatorClock::AsRecorded)?;
     let tests = tests(arguments, held, &model, &mut taken)?;
     let Intake { flights, notes, mut in_doubt, used, .. } = taken;
     let options = options(arguments, wanted(arguments, &effects, &model, &flights)?);
@@ -134,15 +144,15 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let [fitting, drawing] = shares(arguments.report.as_deref());
     let mut amended = amend::amend(&model, &flights, &tests, &options, &part(&on_stage, fitting))?;
     let story = &mut amended.amendment;
-    story.notes.splice(0..0, notes);
+    let suspect = suspect::notes(story, &model);
     in_doubt |= doubtful(story);
+    story.notes.splice(0..0, notes.into_iter().chain(suspect));
     let all_refused = story.all_refused();
     let kept = given_is_kept(arguments, story).filter(|_| !all_refused);
-    let answer = amended.amendment.answer.clone().then(next(&arguments.logs.among(&used), &places));
+    let answer = amended.amendment.answer.clone().then(next(&fitted.among(&used), &places));
     // the page is drawn before any file is written, so that Ctrl-C during the drawing leaves no file behind
     let results = (&places, &answer);
-    let draw =
-        || page::page(arguments, &model, &amended, &tests, results, &part(&on_stage, drawing));
+    let draw = || page(arguments, &model, &amended, &tests, results, &part(&on_stage, drawing));
     let drawn = match &arguments.report {
         Some(path) if !all_refused && kept.is_none() => Some((path, draw()?)),
         _ => None,
@@ -150,7 +160,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     bar.go_on()?;
     drop(bar);
     if let Some(why) = &kept {
-        println!("{why} Nothing was written; --accept-anyway writes the fit.\n");
+        println!("{why} {}\n", caller.unwritten());
     }
     print(&amended.amendment, &answer);
     if all_refused {
@@ -166,7 +176,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some((path, page)) = drawn {
         files::write(path, &page, overwrite)?;
     }
-    print_summary(&answer);
+    caller.print_summary(&answer);
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
@@ -202,7 +212,7 @@ fn given_is_kept(arguments: &Arguments, story: &Amendment) -> Option<String> {
     story.worse().or_else(by_chance).or_else(unjudged).filter(|_| !arguments.accept_anyway)
 }
 
-/// The command to run next: a diagnosis of the amended model with `logs`, those that were used.
+/// The command to run next: a diagnosis of the amended model with `logs`, those that were fitted.
 fn next(logs: &LogArguments, places: &Places) -> String {
     format!("greylag diagnose --model {}{}", quoted(&places.model()), logs.words())
 }
@@ -219,10 +229,11 @@ fn options(arguments: &Arguments, effects: Vec<Added>) -> amend::Options {
     }
 }
 
-/// Whether an effect was refused, a coefficient ended at a bound, or flights contradict one another.
+/// Whether an effect was refused, a coefficient ended at a bound, a control has no effect, or flights contradict one another.
 fn doubtful(story: &Amendment) -> bool {
     story.effects.iter().any(|e| !e.refused.is_empty())
         || story.parameters.iter().any(|p| p.at_bound)
+        || suspect::without_effect(&story.parameters).is_some()
         || !amend::contradictions(&story.parameters).is_empty()
 }
 

@@ -18,8 +18,11 @@ use greylag_physics::rigid_body::horizon_to_body;
 const ALPHA_LIMIT: f64 = 5.0 * std::f64::consts::PI / 180.0;
 /// Least disagreement for which an airspeed is refused, m/s and as a fraction of the measurement.
 const AIRSPEED_LIMIT: (f64, f64) = (3.0, 0.2);
-/// A measurement is refused after this time of disagreement, s. Ten states must agree on it.
+/// A measurement is refused after this time of disagreement, s. Ten states must agree on it. One that jumps away from both
+/// references is refused at once.
 const REFUSED_AFTER_S: f64 = 0.1;
+/// Time from a jump of a measurement for which it counts as one, s.
+const JUMP_S: f64 = 0.03;
 /// A refused measurement is used again after this time of agreement, s.
 const TRUSTED_AFTER_S: f64 = 1.0;
 /// Time between two states above which disagreement and agreement are counted anew, s.
@@ -88,11 +91,27 @@ struct Check {
     refused: bool,
     /// Time of the last state, and time for which it has contradicted the present use, s.
     last: Option<(Time, f64)>,
+    /// Time and value of the last measurement.
+    measured: Option<(Time, f64)>,
+    /// Time of the last jump.
+    jumped: Option<Time>,
 }
 
 impl Check {
-    /// Registers whether the references contradict the measurement at `time`. Returns whether its use changes.
-    fn see(&mut self, time: Time, contradicted: bool) -> bool {
+    /// Registers the measurement `value` at `time`. Returns whether it has just jumped: it changed by more than `limit` from one
+    /// state to the next.
+    fn jumps(&mut self, time: Time, value: f64, limit: f64) -> bool {
+        let soon = |before: Time| time.since(before).as_secs_f64() <= JUMP_S;
+        let last = self.measured.replace((time, value));
+        if last.is_some_and(|(before, last)| soon(before) && (value - last).abs() > limit) {
+            self.jumped = Some(time);
+        }
+        self.jumped.is_some_and(soon)
+    }
+
+    /// Registers whether the references contradict the measurement at `time`, and whether it has just jumped. Returns whether its
+    /// use changes.
+    fn see(&mut self, time: Time, contradicted: bool, jumped: bool) -> bool {
         let before = self.last.map(|(at, lasted)| (time.since(at).as_secs_f64(), lasted));
         let lasted = match before {
             Some((passed, lasted)) if contradicted != self.refused && passed <= GAP_S => {
@@ -100,7 +119,11 @@ impl Check {
             }
             _ => 0.0,
         };
-        let needed = if self.refused { TRUSTED_AFTER_S } else { REFUSED_AFTER_S };
+        let needed = match self.refused {
+            true => TRUSTED_AFTER_S,
+            false if jumped => 0.0,
+            false => REFUSED_AFTER_S,
+        };
         let changes = contradicted != self.refused && lasted >= needed - 1e-6;
         self.refused ^= changes;
         self.last = Some((time, if changes { 0.0 } else { lasted }));
@@ -134,12 +157,19 @@ impl AirDataCheck {
             if self.alpha.refused { flow[0] } else { measured[0] },
             if self.airspeed.refused { flow[1] } else { measured[1] },
         ];
+        let limits = [ALPHA_LIMIT, AIRSPEED_LIMIT.0.max(AIRSPEED_LIMIT.1 * measured[1])];
+        let jumped = [
+            self.alpha.jumps(frame.time, measured[0], limits[0]),
+            self.airspeed.jumps(frame.time, measured[1], limits[1]),
+        ];
+        let corrected = self.reference.alpha(curve, frame, measured[0], airspeed);
+        // a gust that makes the vane jump makes the lift jump too
+        let at_once = curve.measured(frame, airspeed).filter(|_| jumped[0]);
         let lift = [
-            self.reference.alpha(curve, frame, measured[0], airspeed),
+            at_once.unwrap_or(corrected),
             airspeed_by_lift(curve, frame, alpha).unwrap_or(measured[1]),
         ];
         let used = [self.by_lift.alpha(curve, frame, flow[0], airspeed), flow[1]];
-        let limits = [ALPHA_LIMIT, AIRSPEED_LIMIT.0.max(AIRSPEED_LIMIT.1 * measured[1])];
         let contradicted = |k: usize| {
             let off = [flow[k] - measured[k], lift[k] - measured[k]];
             off.iter().all(|x| *x > limits[k]) || off.iter().all(|x| *x < -limits[k])
@@ -147,7 +177,7 @@ impl AirDataCheck {
         let kinds = [(Refused::Alpha, &mut self.alpha), (Refused::Airspeed, &mut self.airspeed)];
         let mut answer = measured;
         for (k, (quantity, check)) in kinds.into_iter().enumerate() {
-            if check.see(frame.time, contradicted(k)) {
+            if check.see(frame.time, contradicted(k), jumped[k]) {
                 let values = check.refused.then_some([measured[k], used[k]]);
                 self.changes.push(Change { quantity, values });
             }
@@ -269,6 +299,15 @@ mod tests {
             level.fly(1.5, |_| ());
             assert_eq!(level.changes(), [false]);
         }
+    }
+
+    #[test]
+    fn a_vane_that_jumps_by_eleven_degrees_is_refused_at_once() {
+        let mut level = Level::new();
+        level.fly(1.0, |_| ());
+        let first = level.fly(0.01, |frame| frame.state.alpha += 0.19);
+        assert!(level.error(first) < 0.5, "{first:?}");
+        assert_eq!(level.changes(), [true]);
     }
 
     #[test]

@@ -101,6 +101,15 @@ impl LiftCurve {
         let part = ((lift - low) / (high - low)).clamp(0.0, 1.0);
         self.from + SPACING_DEG * DEGREE * (k as f64 - 1.0 + part)
     }
+
+    /// Angle of attack (rad) at which the model has the measured lift of `frame` at the true airspeed `airspeed` (m/s). `None`
+    /// without an accelerometer and at a low airspeed.
+    pub(super) fn measured(&self, frame: &Telemetry, airspeed: f64) -> Option<f64> {
+        let whole = !frame.faults.contains(Faults::SPECIFIC_FORCE) && airspeed > SLOWEST_MPS;
+        let pressure = 0.5 * standard_density(frame.altitude) * airspeed * airspeed;
+        let lift = -frame.specific_force[2] / pressure;
+        (whole && lift.is_finite()).then(|| self.angle(lift, frame.actuators.elevator))
+    }
 }
 
 /// The correction of an estimated angle of attack by the measured lift.
@@ -126,13 +135,8 @@ impl ByLift {
                 (added, step) = (last, passed);
             }
         }
-        let down = frame.specific_force[2];
-        let whole = !frame.faults.contains(Faults::SPECIFIC_FORCE) && airspeed > SLOWEST_MPS;
-        let pressure = 0.5 * standard_density(frame.altitude) * airspeed * airspeed;
-        let lift = -down / pressure;
-        if whole && lift.is_finite() {
-            let off = curve.angle(lift, frame.actuators.elevator) - (estimated + added);
-            added += off * (step / TIME_S).min(1.0);
+        if let Some(angle) = curve.measured(frame, airspeed) {
+            added += (angle - estimated - added) * (step / TIME_S).min(1.0);
         } else {
             added -= added * (step / FORGOTTEN_S).min(1.0);
         }

@@ -61,6 +61,7 @@ impl AnswerBox {
         match self.first {
             First::Effect => " open",
             First::Error if self.answer.behind_baseline() => " missed",
+            First::Error if change < 0.0 && self.answer.gains_nothing() => " open",
             First::Error if change < 0.0 => "",
             First::Error if change > 0.0 => " missed",
             First::Error => " open",

@@ -171,6 +171,7 @@ pub fn amend(
     let mut amended = of_right(model, &flights, held_out, &options, progress)?;
     let forecasts = forecast::unfitted(model, held_out, &options.horizons_s)?;
     let answer = answer::answer(&amended.amendment, seen, &forecasts);
+    let answer = if options.prior == Prior::Bounds { answer.from_scratch() } else { answer };
     let shares = answer::compared([model, &amended.tuned, &amended.model], held_out);
     amended.amendment.answer = match shares {
         Some(shares) => answer.acting(&shares),

@@ -121,6 +121,9 @@ pub struct Numbers {
     pub fitted_flights: Option<usize>,
     /// Whether the flights are the last third of a flight to whose first two thirds the model was fitted.
     pub last_third: bool,
+    /// Whether the fit had no prior but the bounds, so that it cannot be repeated from scratch.
+    #[serde(skip)]
+    pub from_scratch: bool,
     /// The models, from the given model to the last model; empty if no horizon is reached.
     pub steps: Vec<Step>,
     /// Change of the error from the first to the last model, %; NaN (null) for a single model.
@@ -128,6 +131,10 @@ pub struct Numbers {
     /// The best baseline forecast; `None` if the answer has none, or if no run of the forecast reaches the horizon.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub baseline: Option<Baseline>,
+    /// Change from the error of this forecast to that of the last model if the last model was fitted, %; `None` if it was not, or
+    /// without a forecast.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub beside_baseline_percent: Option<f64>,
     /// Effects that the last model has and the first model lacks.
     pub effects: Vec<Decisive>,
     /// The one or two channels in which these effects act, the largest reduction first; empty if the shares are unknown.
@@ -160,6 +167,8 @@ impl Numbers {
         let baseline = subject.baseline.and_then(|(name, scores)| {
             Some(Baseline { name: name.into(), error: score(scores, horizon_s)?.rmse_scaled })
         });
+        let fitted = steps.last().filter(|s| matches!(s.way, Way::Tuned | Way::Effects));
+        let beside = |(b, last): (&Baseline, &Step)| change(b.error, last.error);
         let before = match (&at[..], stages.last().map(|s| s.way)) {
             ([.., before, _], Some(Way::Effects)) => Some(before),
             ([first, .., _], Some(_)) => Some(first),
@@ -174,7 +183,9 @@ impl Numbers {
                 Seen::LastThird => Some(0),
             },
             last_third: subject.seen == Seen::LastThird,
+            from_scratch: false,
             change_percent,
+            beside_baseline_percent: baseline.as_ref().zip(fitted).map(beside),
             baseline,
             effects: subject.effects.clone(),
             acts: Vec::new(),

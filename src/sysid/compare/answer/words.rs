@@ -2,6 +2,7 @@
 //! (open-loop simulations) at a horizon.
 
 use super::acting::{Acting, Method};
+use super::fitted::{gain, small_gain};
 use super::numbers::{Baseline, Decisive, InUse, Left, NOTICED, Numbers, Step, Way};
 
 /// Unexplained share above which it is stated as a multiple of the variance, because a percentage of four or more digits is hard to
@@ -17,10 +18,11 @@ pub fn error(n: &Numbers) -> String {
     match n.better_baseline() {
         Some(baseline) if n.all_behind() => behind(n, baseline, first, rest),
         Some(baseline) => {
-            format!("As given, the model is {}. {}", worse_than(baseline), changes(n, first, rest))
+            let changes = changes(n, first, rest);
+            format!("As given, the model is {}. {changes}{}", worse_than(baseline), gain(n))
         }
         None if n.in_vain() => kept(n, first.error, rest[0].error),
-        None => changes(n, first, rest),
+        None => changes(n, first, rest) + &gain(n),
     }
 }
 
@@ -35,12 +37,15 @@ fn behind(n: &Numbers, baseline: &Baseline, first: &Step, rest: &[Step]) -> Stri
         _ => format!(",{} {}", by(n, step), number(step.error)),
     };
     format!(
-        "The model is {}: {begin} at {} s is {}{}. Check axes, signs and units of the logs, fly more and richer manoeuvres, \
-         or fit it from scratch.",
+        "The model is {}: {begin} at {} s is {}{}. Check axes, signs and units of the logs, {}.",
         worse_than(baseline),
         number(n.horizon_s),
         number(first.error),
-        rest.iter().map(at).collect::<String>()
+        rest.iter().map(at).collect::<String>(),
+        match n.from_scratch {
+            true => "or fly more and richer manoeuvres",
+            false => "fly more and richer manoeuvres, or fit it from scratch",
+        }
     )
 }
 
@@ -251,10 +256,12 @@ pub fn summary(n: &Numbers) -> String {
         [only] => format!("{at} {}", number(only.error)),
         [first, .., last] => {
             format!(
-                "{at} {} → {} ({})",
+                "{at} {} → {} ({}{})",
                 number(first.error),
                 number(last.error),
-                percent(n.change_percent)
+                percent(n.change_percent),
+                small_gain(n)
+                    .map_or(String::new(), |(p, b)| format!("; {p} beside \"{}\"", b.name))
             )
         }
     }
@@ -324,7 +331,7 @@ fn by(n: &Numbers, step: &Step) -> String {
 }
 
 /// A change `p` (%) as text with its sign. Magnitudes below 10 % and from 98 to 100 % have one decimal place.
-fn percent(p: f64) -> String {
+pub(super) fn percent(p: f64) -> String {
     let sign = if p > 0.0 { "+" } else { "−" };
     match p.abs() {
         size if !size.is_finite() => "–".into(),
@@ -335,7 +342,7 @@ fn percent(p: f64) -> String {
 }
 
 /// `x` with three significant digits, without zeros at the end, and with the minus sign U+2212.
-fn number(x: f64) -> String {
+pub(super) fn number(x: f64) -> String {
     let text = match x.abs() {
         0.0 => return "0".into(),
         size if !size.is_finite() => return "–".into(),
