@@ -169,6 +169,17 @@ fn a_command_that_moves_with_a_reversed_deflection_is_corrected_with_it() {
 }
 
 #[test]
+fn exchanged_north_and_east_are_named_and_their_mapping_cures_them() {
+    let bytes = spoiled(|s| s.velocity_ned_mps.swap(0, 1));
+    let said = found(&bytes, "");
+    assert!(said.contains("vn_mps and ve_mps look exchanged"), "{said}");
+    let lines = [("vn", "ve"), ("ve", "vn")]
+        .map(|(column, from)| format!("{column}_mps = {{ from = \"csv.{from}_mps\", scale = 1 }}"));
+    assert!(lines.iter().all(|line| said.contains(line)), "{said}");
+    assert_eq!(found(&bytes, &lines.join("\n")), "");
+}
+
+#[test]
 fn foreign_axes_are_named_as_such() {
     let said = found(
         &spoiled(|s| {

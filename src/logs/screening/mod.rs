@@ -4,6 +4,7 @@
 //! - The Euler angles are the integral of their rates, which follow from the body rates.
 //! - A steady turn has V ψ̇ = g tan φ.
 //! - The altitude is the integral of the climb rate.
+//! - The course turns with the heading.
 //! - A positive aileron rolls the aircraft to the right.
 //!
 //! A finding names the column and the mapping that corrects it. No column is converted without a mapping.
@@ -11,6 +12,7 @@
 mod air;
 mod angles;
 mod clock;
+mod course;
 mod cure;
 mod dead;
 mod force;
@@ -74,7 +76,9 @@ fn checks(rows: &[Sample], flown: &[Sample], flies: &Flying) -> Vec<Finding> {
     let mut out = angles::check(rows, flies_at_all);
     out.extend(force::check(rows));
     let flown_s = flown.first().zip(flown.last()).map_or(0.0, |(a, b)| b.time_s - a.time_s);
+    let course = if out.is_empty() { course::check(rows) } else { None };
     let axes_are_right = out.is_empty() && !(flies_at_all && flown_s < flies.shortest_s);
+    out.extend(course);
     out.extend(air::check(rows, flown));
     out.extend(surfaces::check(rows, axes_are_right, flies));
     out
