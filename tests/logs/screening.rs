@@ -169,6 +169,22 @@ fn a_command_that_moves_with_a_reversed_deflection_is_corrected_with_it() {
 }
 
 #[test]
+fn a_climb_rate_is_checked_though_no_row_has_it_beside_the_altitude() {
+    let slow = |sign: f64| {
+        spoiled(move |s| {
+            let row = (100.0 * s.time_s).round() as i64;
+            s.velocity_ned_mps[2] =
+                if row % 4 == 0 { sign * s.velocity_ned_mps[2] } else { f64::NAN };
+            s.altitude_m = if row % 4 == 1 { s.altitude_m } else { f64::NAN };
+        })
+    };
+    assert_eq!(found(&slow(1.0), ""), "");
+    let said = found(&slow(-1.0), "");
+    assert!(said.contains("velocity looks positive up"), "{said}");
+    assert_eq!(found(&slow(-1.0), r#"vd_mps = { from = "csv.vd_mps", scale = -1 }"#), "");
+}
+
+#[test]
 fn exchanged_north_and_east_are_named_and_their_mapping_cures_them() {
     let bytes = spoiled(|s| s.velocity_ned_mps.swap(0, 1));
     let said = found(&bytes, "");

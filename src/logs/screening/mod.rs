@@ -16,6 +16,7 @@ mod course;
 mod cure;
 mod dead;
 mod force;
+mod held;
 mod relation;
 mod surfaces;
 
