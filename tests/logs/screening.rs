@@ -185,6 +185,28 @@ fn a_climb_rate_is_checked_though_no_row_has_it_beside_the_altitude() {
 }
 
 #[test]
+fn an_inverted_throttle_is_named_and_its_mapping_cures_it() {
+    let bytes = spoiled(|s| s.throttle = 1.0 - s.throttle);
+    let said = found(&bytes, "");
+    let cure = r#"throttle = { from = "csv.throttle", scale = -1, offset = 1 }"#;
+    assert!(said.starts_with("throttle acts the other way") && said.contains(cure), "{said}");
+    assert_eq!(found(&bytes, cure), "");
+}
+
+#[test]
+fn real_flights_have_right_velocities_and_throttles() {
+    for aircraft in ["dawn_one", "proto", "thor"] {
+        for flight in ["fit", "test"] {
+            let path = format!("{}/tests/data/{aircraft}/{flight}.csv", env!("CARGO_MANIFEST_DIR"));
+            let said = found(&std::fs::read(path).unwrap(), "");
+            for words in ["exchanged", "throttle acts", "throttle_cmd acts", "vd_mps", "altitude"] {
+                assert!(!said.contains(words), "{aircraft} {flight}: {said}");
+            }
+        }
+    }
+}
+
+#[test]
 fn exchanged_north_and_east_are_named_and_their_mapping_cures_them() {
     let bytes = spoiled(|s| s.velocity_ned_mps.swap(0, 1));
     let said = found(&bytes, "");

@@ -6,6 +6,7 @@
 //! - The altitude is the integral of the climb rate.
 //! - The course turns with the heading.
 //! - A positive aileron rolls the aircraft to the right.
+//! - Thrust pushes the aircraft forward and feeds its energy.
 //!
 //! A finding names the column and the mapping that corrects it. No column is converted without a mapping.
 
@@ -19,6 +20,7 @@ mod force;
 mod held;
 mod relation;
 mod surfaces;
+mod throttle;
 
 use std::borrow::Cow;
 

@@ -1,10 +1,10 @@
 //! Checks of surfaces and throttle: their units, and whether a surface accelerates the aircraft in the right direction. A
 //! finding is a message to the user of a log.
 
-use super::cured;
 use super::relation::{
     change, mean, partial_correlation, quantile, tame, values, windows, with_intercept,
 };
+use super::{cured, throttle as power};
 use crate::Sample;
 use crate::finding::Finding;
 use crate::phases::Flying;
@@ -36,7 +36,7 @@ const AILERON: Surface = [("aileron_rad", |s| s.aileron_rad), ("aileron_cmd", |s
 const ELEVATOR: Surface =
     [("elevator_rad", |s| s.elevator_rad), ("elevator_cmd", |s| s.elevator_cmd)];
 
-/// Checks the units and, if units and axes are right, the directions in which aileron and elevator act.
+/// Checks the units and, if units and axes are right, the directions in which aileron, elevator and throttle act.
 pub fn check(rows: &[Sample], axes_are_right: bool, flies: &Flying) -> Vec<Finding> {
     let mut out: Vec<Finding> = units(rows);
     if out.is_empty() && axes_are_right {
@@ -45,6 +45,7 @@ pub fn check(rows: &[Sample], axes_are_right: bool, flies: &Flying) -> Vec<Findi
             let beside = found.as_ref().and_then(|f| command(f, rows, surface));
             out.extend(found.into_iter().chain(beside));
         }
+        out.extend(power::check(rows));
     }
     out
 }
