@@ -42,6 +42,11 @@ pub fn screened(rows: &mut [Sample], flies: &Flying) -> Vec<Finding> {
     found
 }
 
+/// The note that a flight does not show the signs of surfaces that move; `None` if it shows them.
+pub fn hidden_signs(rows: &[Sample], flies: &Flying) -> Option<Finding> {
+    surfaces::hidden_signs(&in_flight(rows, flies), flies)
+}
+
 /// All findings about `rows`, and whether the aircraft flies in them.
 fn screen(rows: &[Sample], flies: &Flying) -> (Vec<Finding>, bool) {
     if rows.is_empty() {
