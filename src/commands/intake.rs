@@ -342,7 +342,10 @@ fn refuse_problems(path: &Path, log: &Log, cure: fn(&Path) -> String) -> Result<
     }
     // For a problem that a factor corrects, the message names only the column. The command in the message explains the problem.
     let said = |f: &&Finding| match &f.cure {
-        Some(Cure { column, scale, offset }) => {
+        Some(Cure { column, exchanged_with: Some(other), .. }) => {
+            format!("{column} and {other} are exchanged")
+        }
+        Some(Cure { column, scale, offset, .. }) => {
             let plus = if *offset == 0.0 { String::new() } else { format!(" plus {offset}") };
             format!("{column} has a wrong unit or sign (read it times {scale:.4}{plus})")
         }

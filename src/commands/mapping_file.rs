@@ -23,11 +23,11 @@ impl<'a> Wanted<'a> {
     fn of((path, info): &'a (PathBuf, Info)) -> Self {
         let cures = || info.findings.iter().filter_map(|f| f.cure.as_ref());
         // a finding about a sign is reliable only if the units are right, so that wrong units are corrected first
-        let units = cures().any(|cure| cure.scale > 0.0);
+        let units = cures().any(|cure| cure.scale > 0.0 && cure.exchanged_with.is_none());
         let mut entries = BTreeMap::new();
         for cure in cures().filter(|cure| !units || cure.scale > 0.0) {
-            for column in cure.columns() {
-                let entry = info.entries.get(column);
+            for (column, from) in cure.sources() {
+                let entry = info.entries.get(from);
                 let text = entry.map(|e| e.corrected(cure.scale, cure.offset, info.format));
                 entries.extend(text.map(|text| (column.to_owned(), text)));
             }

@@ -19,7 +19,8 @@ pub enum Severity {
     Problem,
 }
 
-/// A factor, and for some columns a constant, that correct a column. The `Display` text has the entry for a mapping file.
+/// A factor, and for some columns a constant, that correct a column, or the exchange of two columns. The `Display` text has the
+/// entries for a mapping file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cure {
     /// Name of the column to be corrected.
@@ -29,6 +30,9 @@ pub struct Cure {
     /// Constant that is added to the multiplied column, in the column's unit.
     #[serde(skip_serializing_if = "is_zero")]
     pub offset: f64,
+    /// The other column, if two columns are to be exchanged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exchanged_with: Option<String>,
 }
 
 fn is_zero(x: &f64) -> bool {
@@ -49,21 +53,50 @@ const ALIKE: [[&str; 3]; 3] = [
 impl Cure {
     /// The correction that multiplies `column` by `scale`.
     pub fn factor(column: impl Into<String>, scale: f64) -> Cure {
-        Cure { column: column.into(), scale, offset: 0.0 }
+        Cure { column: column.into(), scale, offset: 0.0, exchanged_with: None }
     }
 
-    /// The line of a mapping file that makes the correction in a CSV table.
+    /// The correction that exchanges `column` and `other`.
+    pub fn exchange(column: impl Into<String>, other: impl Into<String>) -> Cure {
+        Cure { exchanged_with: Some(other.into()), ..Cure::factor(column, 1.0) }
+    }
+
+    /// The line of a mapping file that makes the correction in a CSV table; two lines for an exchange.
     pub fn line(&self) -> String {
-        self.line_of(&Entry::scaled(TEXT, &self.column, 1.0), Format::Csv)
+        let entry = |column: &str| (column.to_owned(), Entry::scaled(TEXT, column, 1.0));
+        let entries: BTreeMap<String, Entry> = self.columns().into_iter().map(entry).collect();
+        self.line_of(&entries, Format::Csv).unwrap_or_default()
     }
 
-    /// The line of a mapping file that makes the correction in a log of `format`, in which `entry` fills the column.
-    fn line_of(&self, entry: &Entry, format: Format) -> String {
-        format!("{} = {}", self.column, entry.corrected(self.scale, self.offset, format))
+    /// The line of a mapping file that makes the correction in a log of `format`, whose columns `entries` fill. `None` if an entry is
+    /// missing.
+    fn line_of(&self, entries: &BTreeMap<String, Entry>, format: Format) -> Option<String> {
+        let line = |column: &str, from: &str| {
+            let entry = entries.get(from)?;
+            Some(format!("{column} = {}", entry.corrected(self.scale, self.offset, format)))
+        };
+        let column = self.column.as_str();
+        match self.exchanged_with.as_deref() {
+            None => line(column, column),
+            Some(other) => Some(format!("{} and {}", line(column, other)?, line(other, column)?)),
+        }
     }
 
-    /// The columns that are multiplied: the column itself. If its unit is wrong, the unit of its whole group is.
+    /// The columns that are corrected, each with the column whose field fills it from then on.
+    pub fn sources(&self) -> Vec<(&str, &str)> {
+        let column = self.column.as_str();
+        match self.exchanged_with.as_deref() {
+            Some(other) => vec![(column, other), (other, column)],
+            None => self.columns().into_iter().map(|column| (column, column)).collect(),
+        }
+    }
+
+    /// The columns that are corrected: the column itself, and one that is exchanged with it. If its unit is wrong, the unit of its
+    /// whole group is.
     pub fn columns(&self) -> Vec<&str> {
+        if let Some(other) = &self.exchanged_with {
+            return vec![self.column.as_str(), other.as_str()];
+        }
         let group = ALIKE.iter().find(|group| group[0] == self.column && self.scale > 0.0);
         group.map_or_else(|| vec![self.column.as_str()], |group| group.to_vec())
     }
@@ -141,7 +174,7 @@ pub(super) fn named(
 ) -> Finding {
     let Some(cure) = &finding.cure else { return choices_named(finding, entries, format) };
     let (Cure { column, scale, .. }, said) = (cure, cure.to_string());
-    let Some(entry) = entries.get(column) else {
+    let (Some(entry), Some(line)) = (entries.get(column), cure.line_of(entries, format)) else {
         let better = format!(
             "{column} is computed from several fields or from servo pulses, so that no factor in a mapping corrects it: state what the outputs drive in [surfaces] of an airframe file (--airframe), or name another field in a mapping (--mapping)"
         );
@@ -153,18 +186,15 @@ pub(super) fn named(
             entry.topic, entry.field
         ));
     }
-    let better = format!(
-        "read it with --mapping FILE, in which [columns] has {}",
-        cure.line_of(entry, format)
-    );
+    let better = format!("read it with --mapping FILE, in which [columns] has {line}");
     Finding { text: finding.text.replace(&said, &better), ..finding }
 }
 
 /// Adapts the possible corrections of `finding` to the log, as [`named`] does for a single one.
 fn choices_named(finding: Finding, entries: &BTreeMap<String, Entry>, format: Format) -> Finding {
-    let better = |cure: &Cure| match entries.get(&cure.column) {
-        Some(entry) => cure.line_of(entry, format),
-        None => format!("{} times {}", cure.column, cure.scale),
+    let better = |cure: &Cure| {
+        let line = cure.line_of(entries, format);
+        line.unwrap_or_else(|| format!("{} times {}", cure.column, cure.scale))
     };
     let text = finding
         .choices

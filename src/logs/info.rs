@@ -11,7 +11,7 @@ use super::phases::{self, Phase, PhaseKind};
 use super::rudder::RudderMotion;
 use super::sources::Source;
 use super::vehicle::Vehicle;
-use super::{Channel, Format, Log, Sample, assess};
+use super::{Channel, Format, Log, Sample, assess, screening};
 
 /// Summary of a log, as `greylag logs info` prints it.
 #[derive(Clone, Debug, Serialize)]
@@ -111,7 +111,11 @@ impl Info {
             entries: log.entries.clone(),
             purposes: purposes(log).into_iter().map(|p| weighed(log, flight_s, p)).collect(),
             topics: log.topics.clone(),
-            findings: rudder(log).into_iter().chain(log.findings.iter().cloned()).collect(),
+            findings: [rudder(log), signs(log)]
+                .into_iter()
+                .flatten()
+                .chain(log.findings.clone())
+                .collect(),
         }
     }
 
@@ -128,6 +132,15 @@ fn rudder(log: &Log) -> Option<Finding> {
         "{motion}: unless the airframe file says that the aircraft has no rudder, a model needs \
          rudder_linear, or yaw, roll, side-force and drag residuals include its moments and forces"
     )))
+}
+
+/// The note that the flight does not show the signs of surfaces; `None` if it does, or if the log has a problem or no wings.
+fn signs(log: &Log) -> Option<Finding> {
+    let has_wings = log.vehicle.as_ref().is_none_or(|v| v.refusal().is_none());
+    if !has_wings || log.problems().is_some() {
+        return None;
+    }
+    screening::hidden_signs(&log.flight.samples, &log.flies)
 }
 
 /// A column counts as present if it has values in this fraction of the rows. For a slow channel, this fraction of the samples

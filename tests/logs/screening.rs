@@ -169,6 +169,55 @@ fn a_command_that_moves_with_a_reversed_deflection_is_corrected_with_it() {
 }
 
 #[test]
+fn a_climb_rate_is_checked_though_no_row_has_it_beside_the_altitude() {
+    let slow = |sign: f64| {
+        spoiled(move |s| {
+            let row = (100.0 * s.time_s).round() as i64;
+            s.velocity_ned_mps[2] =
+                if row % 4 == 0 { sign * s.velocity_ned_mps[2] } else { f64::NAN };
+            s.altitude_m = if row % 4 == 1 { s.altitude_m } else { f64::NAN };
+        })
+    };
+    assert_eq!(found(&slow(1.0), ""), "");
+    let said = found(&slow(-1.0), "");
+    assert!(said.contains("velocity looks positive up"), "{said}");
+    assert_eq!(found(&slow(-1.0), r#"vd_mps = { from = "csv.vd_mps", scale = -1 }"#), "");
+}
+
+#[test]
+fn an_inverted_throttle_is_named_and_its_mapping_cures_it() {
+    let bytes = spoiled(|s| s.throttle = 1.0 - s.throttle);
+    let said = found(&bytes, "");
+    let cure = r#"throttle = { from = "csv.throttle", scale = -1, offset = 1 }"#;
+    assert!(said.starts_with("throttle acts the other way") && said.contains(cure), "{said}");
+    assert_eq!(found(&bytes, cure), "");
+}
+
+#[test]
+fn real_flights_have_right_velocities_and_throttles() {
+    for aircraft in ["dawn_one", "proto", "thor"] {
+        for flight in ["fit", "test"] {
+            let path = format!("{}/tests/data/{aircraft}/{flight}.csv", env!("CARGO_MANIFEST_DIR"));
+            let said = found(&std::fs::read(path).unwrap(), "");
+            for words in ["exchanged", "throttle acts", "throttle_cmd acts", "vd_mps", "altitude"] {
+                assert!(!said.contains(words), "{aircraft} {flight}: {said}");
+            }
+        }
+    }
+}
+
+#[test]
+fn exchanged_north_and_east_are_named_and_their_mapping_cures_them() {
+    let bytes = spoiled(|s| s.velocity_ned_mps.swap(0, 1));
+    let said = found(&bytes, "");
+    assert!(said.contains("vn_mps and ve_mps look exchanged"), "{said}");
+    let lines = [("vn", "ve"), ("ve", "vn")]
+        .map(|(column, from)| format!("{column}_mps = {{ from = \"csv.{from}_mps\", scale = 1 }}"));
+    assert!(lines.iter().all(|line| said.contains(line)), "{said}");
+    assert_eq!(found(&bytes, &lines.join("\n")), "");
+}
+
+#[test]
 fn foreign_axes_are_named_as_such() {
     let said = found(
         &spoiled(|s| {

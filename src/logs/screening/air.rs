@@ -3,6 +3,7 @@
 use nalgebra::{Rotation3, Vector3};
 
 use super::force::air_velocity;
+use super::held::held;
 use super::relation::{
     Relation, change, integral, near, quantile, through_origin, values, windows, with_intercept,
 };
@@ -31,6 +32,9 @@ const CLIMB: f64 = 0.3;
 const FOOT: f64 = 0.3048;
 /// Length of the windows over which the change of altitude is compared with the integral of the climb rate, s.
 const CLIMB_S: f64 = 2.0;
+/// Columns of the check of the altitude, which a flight controller may log at different times, and least time between its rows, s.
+const OF_CLIMB: [&str; 5] = ["pitch_rad", "airspeed_mps", "alpha_rad", "vd_mps", "altitude_m"];
+const CLIMB_EVERY_S: f64 = 0.099;
 /// Largest interquartile range, relative to the median, of the ratios of airspeed to ground speed. If it is larger, wind affects
 /// the ratios and they are not used.
 const GROUND_SPREAD: f64 = 0.25;
@@ -158,7 +162,8 @@ fn vanes(rows: &[Sample]) -> Vec<Finding> {
 /// from airspeed, pitch and angle of attack. If there is no finding, the air density is checked. `speed_is_right` states whether
 /// the check of the airspeed found nothing.
 fn climb(rows: &[Sample], speed_is_right: bool) -> Option<Finding> {
-    let windows = windows(rows, CLIMB_S);
+    let together = held(rows, &OF_CLIMB, CLIMB_EVERY_S);
+    let windows = windows(&together, CLIMB_S);
     let height = |w: &&[Sample]| change(w, |s| s.altitude_m);
     let down = through_origin(
         windows.iter().map(|w| (-integral(w, |s| s.velocity_ned_mps[2]), height(w))),

@@ -35,12 +35,13 @@ pub fn tried(
 
 /// A copy of `rows` to which the correction `cure` is applied.
 fn mended(rows: &[Sample], cure: &Cure) -> Vec<Sample> {
-    let columns: Vec<usize> = cure.columns().into_iter().filter_map(index).collect();
+    let places = |(column, from): (&str, &str)| index(column).zip(index(from));
+    let columns: Vec<(usize, usize)> = cure.sources().into_iter().filter_map(places).collect();
     let mut rows = rows.to_vec();
     for row in &mut rows {
-        for i in &columns {
-            let value = COLUMNS[*i].2(row);
-            *value = *value * cure.scale + cure.offset;
+        let before = *row;
+        for (i, from) in &columns {
+            *COLUMNS[*i].2(row) = COLUMNS[*from].1(&before) * cure.scale + cure.offset;
         }
     }
     rows

@@ -4,18 +4,23 @@
 //! - The Euler angles are the integral of their rates, which follow from the body rates.
 //! - A steady turn has V ψ̇ = g tan φ.
 //! - The altitude is the integral of the climb rate.
+//! - The course turns with the heading.
 //! - A positive aileron rolls the aircraft to the right.
+//! - Thrust pushes the aircraft forward and feeds its energy.
 //!
 //! A finding names the column and the mapping that corrects it. No column is converted without a mapping.
 
 mod air;
 mod angles;
 mod clock;
+mod course;
 mod cure;
 mod dead;
 mod force;
+mod held;
 mod relation;
 mod surfaces;
+mod throttle;
 
 use std::borrow::Cow;
 
@@ -35,6 +40,11 @@ pub fn screened(rows: &mut [Sample], flies: &Flying) -> Vec<Finding> {
         dead::blank(rows);
     }
     found
+}
+
+/// The note that a flight does not show the signs of surfaces that move; `None` if it shows them.
+pub fn hidden_signs(rows: &[Sample], flies: &Flying) -> Option<Finding> {
+    surfaces::hidden_signs(&in_flight(rows, flies), flies)
 }
 
 /// All findings about `rows`, and whether the aircraft flies in them.
@@ -74,7 +84,9 @@ fn checks(rows: &[Sample], flown: &[Sample], flies: &Flying) -> Vec<Finding> {
     let mut out = angles::check(rows, flies_at_all);
     out.extend(force::check(rows));
     let flown_s = flown.first().zip(flown.last()).map_or(0.0, |(a, b)| b.time_s - a.time_s);
+    let course = if out.is_empty() { course::check(rows) } else { None };
     let axes_are_right = out.is_empty() && !(flies_at_all && flown_s < flies.shortest_s);
+    out.extend(course);
     out.extend(air::check(rows, flown));
     out.extend(surfaces::check(rows, axes_are_right, flies));
     out

@@ -1,10 +1,10 @@
 //! Checks of surfaces and throttle: their units, and whether a surface accelerates the aircraft in the right direction. A
 //! finding is a message to the user of a log.
 
-use super::cured;
 use super::relation::{
     change, mean, partial_correlation, quantile, tame, values, windows, with_intercept,
 };
+use super::{cured, throttle as power};
 use crate::Sample;
 use crate::finding::Finding;
 use crate::phases::Flying;
@@ -36,7 +36,7 @@ const AILERON: Surface = [("aileron_rad", |s| s.aileron_rad), ("aileron_cmd", |s
 const ELEVATOR: Surface =
     [("elevator_rad", |s| s.elevator_rad), ("elevator_cmd", |s| s.elevator_cmd)];
 
-/// Checks the units and, if units and axes are right, the directions in which aileron and elevator act.
+/// Checks the units and, if units and axes are right, the directions in which aileron, elevator and throttle act.
 pub fn check(rows: &[Sample], axes_are_right: bool, flies: &Flying) -> Vec<Finding> {
     let mut out: Vec<Finding> = units(rows);
     if out.is_empty() && axes_are_right {
@@ -45,6 +45,7 @@ pub fn check(rows: &[Sample], axes_are_right: bool, flies: &Flying) -> Vec<Findi
             let beside = found.as_ref().and_then(|f| command(f, rows, surface));
             out.extend(found.into_iter().chain(beside));
         }
+        out.extend(power::check(rows));
     }
     out
 }
@@ -120,9 +121,41 @@ fn throttle(column: &str, size: f64) -> Finding {
     }
 }
 
-/// Checks the direction of the aileron by a regression of ṗ on p, r, β (if known) and the aileron. Positive aileron must
-/// accelerate the right wing downwards.
+/// How a surface acts: its column, the partial correlation of the angular acceleration with it, positive for the right sign, and the
+/// magnitude from which on the correlation shows the sign.
+struct Acting {
+    column: &'static str,
+    correlation: f64,
+    limit: f64,
+}
+
+/// The note that the flight does not show the signs of surfaces that move; `None` if it shows them.
+pub fn hidden_signs(rows: &[Sample], flies: &Flying) -> Option<Finding> {
+    let all = [(AILERON, acting_aileron(rows, flies)), (ELEVATOR, acting_elevator(rows, flies))];
+    let hidden = |(surface, acting): &(Surface, Option<Acting>)| {
+        let (column, _) = moving(rows, *surface)?;
+        let shown = acting.as_ref().is_some_and(|a| a.correlation.abs() > a.limit);
+        (!shown).then_some(column)
+    };
+    let columns: Vec<&str> = all.iter().filter_map(hidden).collect();
+    (!columns.is_empty()).then(|| {
+        Finding::note(format!(
+            "sign of {} not checked: the angular acceleration does not show it clearly enough, as under feedback or with few movements; compare it with the attitude at a step",
+            columns.join(" and of ")
+        ))
+    })
+}
+
+/// Checks the direction of the aileron. Positive aileron must accelerate the right wing downwards.
 fn aileron(rows: &[Sample], flies: &Flying) -> Option<Finding> {
+    let Acting { column, correlation, limit } = acting_aileron(rows, flies)?;
+    (correlation < -limit).then(|| {
+        cured(format!("{column} acts the other way: the aircraft rolls left where it is positive, while the log format's is positive for right wing down"), column, -1.0)
+    })
+}
+
+/// How the aileron acts, by a regression of ṗ on p, r, β (if known) and the aileron.
+fn acting_aileron(rows: &[Sample], flies: &Flying) -> Option<Acting> {
     let (column, get) = moving(rows, AILERON)?;
     let beta = has(rows, |s| s.beta_rad);
     let regressors = |w: &[Sample]| {
@@ -131,19 +164,24 @@ fn aileron(rows: &[Sample], flies: &Flying) -> Option<Finding> {
         all.push(mean(w, get));
         all
     };
-    let (found, windows) = polarity(rows, flies, 0, regressors)?;
+    let (correlation, windows) = polarity(rows, flies, 0, regressors)?;
     let all = values(rows, get);
     let range = quantile(&all, 0.95).zip(quantile(&all, 0.05)).map(|(high, low)| high - low);
     let lively = column == "aileron_rad" && windows >= MANY && range.is_some_and(|r| r > LIVELY);
-    let limit = if lively { TURNED_LIVELY } else { TURNED };
-    (found < -limit).then(|| {
-        cured(format!("{column} acts the other way: the aircraft rolls left where it is positive, while the log format's is positive for right wing down"), column, -1.0)
+    Some(Acting { column, correlation, limit: if lively { TURNED_LIVELY } else { TURNED } })
+}
+
+/// Checks the direction of the elevator. Positive elevator must accelerate the nose downwards.
+fn elevator(rows: &[Sample], flies: &Flying) -> Option<Finding> {
+    let Acting { column, correlation, limit } = acting_elevator(rows, flies)?;
+    (correlation < -limit).then(|| {
+        cured(format!("{column} acts the other way: the nose rises where it is positive, while the log format's is positive for nose down"), column, -1.0)
     })
 }
 
-/// Checks the direction of the elevator by a regression of q̇ on q, α and the elevator. If α is unknown, the specific force
-/// along body z divided by V² takes its place. Positive elevator must accelerate the nose downwards.
-fn elevator(rows: &[Sample], flies: &Flying) -> Option<Finding> {
+/// How the elevator acts, by a regression of q̇ on q, α and the elevator. If α is unknown, the specific force along body z divided by
+/// V² takes its place.
+fn acting_elevator(rows: &[Sample], flies: &Flying) -> Option<Acting> {
     let (column, get) = moving(rows, ELEVATOR)?;
     let alpha: Get = match has(rows, |s| s.alpha_rad) {
         true => |s| s.alpha_rad,
@@ -152,9 +190,7 @@ fn elevator(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     let regressors =
         |w: &[Sample]| vec![mean(w, |s| s.rates_radps[1]), mean(w, alpha), mean(w, get)];
     let (found, _) = polarity(rows, flies, 1, regressors)?;
-    (found > TURNED).then(|| {
-        cured(format!("{column} acts the other way: the nose rises where it is positive, while the log format's is positive for nose down"), column, -1.0)
-    })
+    Some(Acting { column, correlation: -found, limit: TURNED })
 }
 
 /// Whether more than half of the rows have a value in the column.
@@ -226,6 +262,9 @@ mod tests {
         assert_eq!(found(-1.0, 1.0).unwrap().cure.unwrap().column, "aileron_rad");
         // the correlation is the same at small deflections, where a controller's feedback might cause it
         assert!(found(-1.0, 0.1).is_none());
+        let hidden = |share| hidden_signs(&rolling(1.0, share), &Flying::default());
+        assert!(hidden(1.0).is_none());
+        assert!(hidden(0.1).unwrap().text.starts_with("sign of aileron_rad not checked: "));
     }
 
     #[test]

@@ -12,16 +12,39 @@ const SCALES: [f64; 2] = [0.8, 1.25];
 const VERTICAL_MPS: f64 = 3.0;
 /// Largest plausible distance of an estimated constant from its prior mean, in prior standard deviations.
 const BELIEVED: f64 = 6.0;
+/// Angle of attack or sideslip, rad, beyond which no aircraft flies on its wings for the share [`SHARE`] of a flight.
+const BROADSIDE: f64 = std::f64::consts::FRAC_PI_3;
+const SHARE: f64 = 0.1;
 /// Number of its standard deviations by which an estimate must exceed a limit to count as impossible.
 pub const SURELY: f64 = 4.0;
 
-/// A sentence for each impossible constant of `flight`, with advice on what to check. Empty if all are possible.
+/// A sentence for each impossible constant of `flight` and for an impossible flow, with advice on what to check. Empty if all are
+/// possible.
 pub fn of_flight(flight: &Reconstruction) -> Vec<String> {
     let speeds: Vec<f64> =
         flight.segments.iter().flat_map(|s| s.instants.iter().map(|i| i.state.airspeed)).collect();
     let found = flight.nuisances.iter().filter_map(|n| Some((n, why(n)?)));
     let all = found.map(|(n, why)| sentence(&flight.name, n, why));
-    all.chain(wind(flight, mean(&speeds))).collect()
+    all.chain(wind(flight, mean(&speeds))).chain(flow(flight)).collect()
+}
+
+/// A sentence on a flight that goes through the air broadside for too long: its velocity contradicts its attitude.
+fn flow(flight: &Reconstruction) -> Option<String> {
+    let states = flight.segments.iter().flat_map(|s| s.instants.iter().map(|i| &i.state));
+    let (mut all, mut beyond) = (0_usize, 0_usize);
+    for state in states.filter(|s| s.alpha.is_finite() && s.beta.is_finite()) {
+        all += 1;
+        beyond += usize::from(state.alpha.abs() > BROADSIDE || state.beta.abs() > BROADSIDE);
+    }
+    let share = beyond as f64 / all.max(1) as f64;
+    (share > SHARE).then(|| {
+        format!(
+            "{}: α or β is beyond 60° for {:.0} % of the flight: velocity and attitude contradict each other; look at north, east \
+             and down of the velocity over ground, at heading and airspeed, or for hovering.",
+            flight.name,
+            100.0 * share
+        )
+    })
 }
 
 fn sentence(flight: &str, n: &Nuisance, why: &str) -> String {
@@ -73,6 +96,8 @@ fn wind(flight: &Reconstruction, airspeed: f64) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flight_path::reconstruction::{Instant, Segment};
+    use greylag_physics::{Controls, State};
 
     fn constant(name: &str, value: f64, sd: f64) -> Nuisance {
         Nuisance { name: name.into(), value, sd, unit: "", prior: None }
@@ -85,6 +110,33 @@ mod tests {
         assert!(why(&constant("airspeed_scale", 1.1, 0.01)).is_none());
         assert!(why(&constant("wind_down", -7.0, 0.5)).is_some());
         assert!(why(&constant("gyro_bias_p", f64::NAN, 0.5)).is_some());
+    }
+
+    #[test]
+    fn a_flight_that_goes_broadside_is_said_and_a_short_tumble_is_not() {
+        let flown = |beyond: usize| {
+            let instant = |k: usize| {
+                let alpha = if k < beyond { -1.5 } else { 0.05 };
+                Instant {
+                    time_s: 0.01 * k as f64,
+                    state: State { airspeed: 17.0, alpha, ..State::default() },
+                    yaw: 0.0,
+                    controls: Controls::default(),
+                    command: None,
+                    specific_force: [0.0; 3],
+                    altitude: 0.0,
+                    density: 1.2,
+                }
+            };
+            let segments = vec![Segment { instants: (0..100).map(instant).collect() }];
+            Reconstruction { segments, ..Reconstruction::empty("swapped.csv") }
+        };
+        assert!(of_flight(&flown(8)).is_empty());
+        let said = of_flight(&flown(40));
+        assert!(
+            said.len() == 1 && said[0].starts_with("swapped.csv: α or β is beyond 60° for 40 %"),
+            "{said:?}"
+        );
     }
 
     #[test]

@@ -8,6 +8,8 @@
 //! ratio, the root of chi-square per degree of freedom (Birge 1932, Physical Review 40, 207). A flight's prior is what the other
 //! flights say, so that its own measurements count once.
 
+use std::f64::consts::PI;
+
 use crate::flight_path::Options;
 use crate::flight_path::reconstruction::Reconstruction;
 use greylag_physics::sensors::Known;
@@ -15,6 +17,9 @@ use greylag_physics::sensors::Known;
 /// A combined value is used if it exceeds this number of its standard deviations. One flight alone exceeds six, so that flights
 /// that agree reach it. Flights that contradict each other do not, because the Birge ratio widens the standard deviation.
 const CLEARLY: f64 = 4.0;
+/// Probability below which a chi-square shows that estimates contradict each other. It is that of agreeing estimates to scatter as
+/// much.
+const CONTRADICTION: f64 = 0.01;
 /// Factor from a standard deviation to half of a 95 % interval.
 const INTERVAL: f64 = 1.96;
 
@@ -39,7 +44,7 @@ pub struct Estimate {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Installation {
     common: Vec<Common>,
-    contradicted: Vec<Contradicted>,
+    unshared: Vec<Unshared>,
 }
 
 /// A constant with the estimates of the flights that determine it.
@@ -52,11 +57,13 @@ struct Common {
     mean: Known,
     /// Whether a flight of the set does not show the constant.
     is_lacking: bool,
+    /// Flights that do not show the constant, and whose own estimates contradict the others. They are left without it.
+    apart: Vec<usize>,
 }
 
-/// A constant for which the estimates of the flights do not agree.
+/// A constant that some flights show, but not the flights together.
 #[derive(Clone, Debug, PartialEq)]
-struct Contradicted {
+struct Unshared {
     name: &'static str,
     /// Indices of the flights that show the constant.
     shown: Vec<usize>,
@@ -91,23 +98,26 @@ impl Installation {
         let Some(mean) = weighted(members.iter().map(|(_, e)| e)) else { return };
         let squares = members.iter().map(|(_, e)| ((e.value - mean.value) / e.sd).powi(2));
         let (chi_square, degrees) = (squares.sum::<f64>(), members.len() - 1);
+        let apart = apart(&members);
         let birge = (chi_square / degrees.max(1) as f64).sqrt().max(1.0);
         members.iter_mut().for_each(|(_, e)| e.sd *= birge);
         let mean = Known { sd: mean.sd * birge, ..mean };
         let shown: Vec<usize> = members.iter().filter(|(_, e)| e.shown).map(|(k, _)| *k).collect();
-        if mean.value.abs() > CLEARLY * mean.sd {
-            let is_lacking = shown.len() < flights.len();
-            self.common.push(Common { name, members, mean, is_lacking });
-        } else if birge > 1.0 {
-            self.contradicted.push(Contradicted { name, shown, chi_square, degrees });
+        let lacking = flights.len() - shown.len();
+        let is_taken = lacking == 0 || apart.len() < lacking;
+        if mean.value.abs() > CLEARLY * mean.sd && is_taken {
+            self.common.push(Common { name, members, mean, is_lacking: lacking > 0, apart });
+        } else if degrees > 0 {
+            self.unshared.push(Unshared { name, shown, chi_square, degrees });
         }
     }
 
     /// Priors for a flight from the other flights of the set. `member` is the flight's index in the set, or `None` for a flight
-    /// outside the set. A constant that all flights of the set show is left to each of them.
+    /// outside the set. A constant that all flights of the set show is left to each of them, and none is given to a flight that
+    /// contradicts it.
     pub fn priors(&self, member: Option<usize>) -> Vec<Prior> {
         let of = |common: &Common| {
-            if member.is_some() && !common.is_lacking {
+            if member.is_some_and(|k| !common.is_lacking || common.apart.contains(&k)) {
                 return None;
             }
             let others = common.members.iter().filter(|(k, _)| Some(*k) != member);
@@ -116,30 +126,71 @@ impl Installation {
         self.common.iter().filter_map(of).collect()
     }
 
-    /// A sentence for each constant that some flights show and others do not, and for each one on which they contradict each
-    /// other. `names` are the names of the flights of the set.
+    /// A sentence for each constant that some flights show and others do not, and for each one that they do not show together.
+    /// `names` are the names of the flights of the set.
     pub fn sentences(&self, names: &[&str]) -> Vec<String> {
         let shared = self.common.iter().filter(|common| common.is_lacking).map(|common| {
             let shown = common.members.iter().filter(|(_, e)| e.shown);
             let shown = listed(names, shown.map(|(k, _)| *k));
+            let apart = match listed(names, common.apart.iter().copied()) {
+                apart if apart.is_empty() => String::new(),
+                apart => format!(", but not {apart}, whose own data contradict it"),
+            };
             format!(
-                "{}, as {shown} shows ({}); the other flights are reconstructed with it too.",
+                "{}, as {shown} shows ({}); the other flights are reconstructed with it too{apart}.",
                 error(common.name, common.mean),
                 common.name,
             )
         });
-        let contradicted = self.contradicted.iter().map(|of| {
-            format!(
-                "{} is shown by {}, but the flights contradict each other (chi-square {:.1} with {} degrees of freedom): each \
-                 keeps its own estimate.",
-                of.name,
-                listed(names, of.shown.iter().copied()),
-                of.chi_square,
-                of.degrees,
-            )
-        });
-        shared.chain(contradicted).collect()
+        shared.chain(self.unshared.iter().map(|of| of.sentence(names))).collect()
     }
+}
+
+impl Unshared {
+    /// Why each flight keeps its own estimate.
+    fn sentence(&self, names: &[&str]) -> String {
+        let shown = listed(names, self.shown.iter().copied());
+        let plural = if self.degrees == 1 { "" } else { "s" };
+        let why = match chi_square_tail(self.chi_square, self.degrees) < CONTRADICTION {
+            true => format!(
+                "the flights contradict each other (chi-square {:.1} with {} degree{plural} of freedom)",
+                self.chi_square, self.degrees
+            ),
+            false => "the flights together do not determine it".to_owned(),
+        };
+        format!("{} is shown by {shown}, but {why}: each keeps its own estimate.", self.name)
+    }
+}
+
+/// The flights that do not show a constant, and whose estimates contradict those of the others.
+fn apart(members: &[(usize, Estimate)]) -> Vec<usize> {
+    let contradicts = |(k, own): &(usize, Estimate)| {
+        let others = weighted(members.iter().filter(|(j, _)| j != k).map(|(_, e)| e))?;
+        let square = (own.value - others.value).powi(2) / (own.sd.powi(2) + others.sd.powi(2));
+        (!own.shown && chi_square_tail(square, 1) < CONTRADICTION).then_some(*k)
+    };
+    members.iter().filter_map(contradicts).collect()
+}
+
+/// The probability that a chi-square with `degrees` degrees of freedom exceeds `x`.
+///
+/// It is exp(−x/2) for two degrees and erfc √(x/2) for one. Two more degrees add (x/2)^(d/2) exp(−x/2) / Γ(d/2 + 1) to that of d
+/// (Abramowitz and Stegun, 26.4.8).
+fn chi_square_tail(x: f64, degrees: usize) -> f64 {
+    let half = 0.5 * x;
+    let (mut tail, mut term, mut d) = match degrees {
+        0 => return if x > 0.0 { 0.0 } else { 1.0 },
+        odd if odd % 2 == 1 => {
+            (libm::erfc(half.sqrt()), 2.0 * (half / PI).sqrt() * (-half).exp(), 1)
+        }
+        _ => ((-half).exp(), half * (-half).exp(), 2),
+    };
+    while d < degrees {
+        tail += term;
+        d += 2;
+        term *= half / (0.5 * d as f64);
+    }
+    tail
 }
 
 /// The names at the indices `places`, with commas between them.

@@ -49,7 +49,7 @@ function about(bench, flight, place, kept) {
   const findings = flight.findings.map((f) => ({
     text: f.text, class: f.severity === "problem" ? "bad" : "",
     // a correction with a constant is made by hand, in a mapping file
-    fix: f.cure && !f.cure.offset && el("button", { type: "button", onclick: () => bench.act({ do: "map", flight: place, column: f.cure.column, scale: f.cure.scale }) }, `Read ${f.cure.column} × ${f.cure.scale}`),
+    fix: f.cure && !f.cure.offset && !f.cure.exchanged_with && el("button", { type: "button", onclick: () => bench.act({ do: "map", flight: place, column: f.cure.column, scale: f.cure.scale }) }, `Read ${f.cure.column} × ${f.cure.scale}`),
   }));
   const serious = flight.findings.filter((f) => f.severity === "problem").length;
   const lacking = flight.purposes.filter((p) => p.missing.length).map((p) => ({ text: `${p.name}: lacks ${p.missing.join(", ")}`, class: "bad" }));

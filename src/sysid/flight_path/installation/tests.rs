@@ -36,9 +36,49 @@ fn flights_that_contradict_each_other_keep_their_own_values() {
     let said = set.sentences(&["a", "b"]);
     assert!(
         said[0].starts_with("alpha_gain is shown by a, but")
-            && said[0].contains("square 162.0 with 1"),
+            && said[0].contains("square 162.0 with 1 degree of freedom)"),
         "{said:?}"
     );
+}
+
+#[test]
+fn flights_that_scatter_by_chance_do_not_contradict_each_other() {
+    let [a, b] = [gain(0.05, 0.008, true), gain(0.035, 0.0078, false)];
+    // chi-square is 1.8, which one degree of freedom exceeds with a probability of 18 %
+    let said = Installation::of(&[&a, &b]).sentences(&["a", "b"]);
+    let [a, b] = [gain(0.09, 0.014, true), gain(0.0, 0.04, false)];
+    let weak = Installation::of(&[&a, &b]);
+    assert!(said[0].contains("the other flights are reconstructed with it too."), "{said:?}");
+    // chi-square is 4.5: 3 % by chance, but the mean of 0.08 has a standard deviation of 0.028
+    assert!(weak.priors(Some(1)).is_empty());
+    let text = "alpha_gain is shown by a, but the flights together do not determine it: each keeps its own estimate.";
+    assert_eq!(weak.sentences(&["a", "b"]), [text]);
+}
+
+#[test]
+fn a_flight_whose_own_data_contradict_the_others_is_left_without_the_constant() {
+    let [a, b, c] = [gain(0.09, 0.005, true), gain(0.085, 0.006, true), gain(0.06, 0.008, false)];
+    let set = Installation::of(&[&a, &b, &c, &[]]);
+    // 0.028 beside a standard deviation of 0.0089 is chi-square 9.9, 0.2 % by chance
+    assert!(set.priors(Some(2)).is_empty());
+    assert!(!set.priors(Some(0)).is_empty() && !set.priors(Some(3)).is_empty());
+    let said = set.sentences(&["a", "b", "c", "d"]);
+    assert!(said[0].ends_with("with it too, but not c, whose own data contradict it."), "{said:?}");
+    // nobody is left who would take it
+    let alone = Installation::of(&[&a, &b, &c]);
+    assert!((0..3).all(|k| alone.priors(Some(k)).is_empty()));
+    assert!(alone.sentences(&["a", "b", "c"])[0].contains("with 2 degrees of freedom"));
+}
+
+#[test]
+fn the_tail_of_chi_square_has_the_tables_quantiles() {
+    // 99 % quantiles: Abramowitz and Stegun, table 26.8
+    for (degrees, quantile) in [(1, 6.6349), (2, 9.21034), (3, 11.3449), (4, 13.2767), (9, 21.6660)]
+    {
+        let tail = chi_square_tail(quantile, degrees);
+        assert!((tail - 0.01).abs() < 1e-6, "{degrees}: {tail}");
+    }
+    assert_eq!([chi_square_tail(0.0, 1), chi_square_tail(0.0, 4)], [1.0; 2]);
 }
 
 #[test]
