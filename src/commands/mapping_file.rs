@@ -140,6 +140,18 @@ mod tests {
     }
 
     #[test]
+    fn exchanged_columns_are_read_from_each_others_fields() {
+        let (path, info) = log("g.csv", 1, &[]);
+        let cure = Some(Cure::exchange("ax_mps2", "ay_mps2"));
+        let findings = vec![Finding { cure, ..Finding::problem("exchanged") }];
+        let text = mapping(&[(path, Info { findings, ..info })]).unwrap().unwrap();
+        for (column, from) in [("ax_mps2", "ay_mps2"), ("ay_mps2", "ax_mps2")] {
+            let line = format!("{column} = {{ from = \"csv.{from}\", scale = 1 }}");
+            assert!(text.contains(&line), "{text}");
+        }
+    }
+
+    #[test]
     fn a_correction_that_does_not_serve_all_logs_is_not_written() {
         let bad = log("g.csv", 10, &[9.80665]);
         let said = |other| mapping(&[bad.clone(), other]).map_err(|e| e.to_string());

@@ -57,7 +57,7 @@ struct Common {
     mean: Known,
     /// Whether a flight of the set does not show the constant.
     is_lacking: bool,
-    /// Flights that do not show the constant, and whose own estimates contradict the others. They are left without it.
+    /// Flights that could show the constant, do not, and contradict the others. They are left without it.
     apart: Vec<usize>,
 }
 
@@ -162,12 +162,14 @@ impl Unshared {
     }
 }
 
-/// The flights that do not show a constant, and whose estimates contradict those of the others.
+/// The flights that do not show a constant although they determine it well enough for that, and whose estimates contradict those of
+/// the others.
 fn apart(members: &[(usize, Estimate)]) -> Vec<usize> {
     let contradicts = |(k, own): &(usize, Estimate)| {
         let others = weighted(members.iter().filter(|(j, _)| j != k).map(|(_, e)| e))?;
         let square = (own.value - others.value).powi(2) / (own.sd.powi(2) + others.sd.powi(2));
-        (!own.shown && chi_square_tail(square, 1) < CONTRADICTION).then_some(*k)
+        let determines = others.value.abs() > CLEARLY * own.sd;
+        (!own.shown && determines && chi_square_tail(square, 1) < CONTRADICTION).then_some(*k)
     };
     members.iter().filter_map(contradicts).collect()
 }

@@ -64,6 +64,9 @@ fn a_flight_whose_own_data_contradict_the_others_is_left_without_the_constant() 
     assert!(!set.priors(Some(0)).is_empty() && !set.priors(Some(3)).is_empty());
     let said = set.sentences(&["a", "b", "c", "d"]);
     assert!(said[0].ends_with("with it too, but not c, whose own data contradict it."), "{said:?}");
+    // a flight that cannot tell the constant from zero takes it, though it is three standard deviations off
+    let vague = gain(0.0, 0.029, false);
+    assert!(!Installation::of(&[&a, &b, &vague]).priors(Some(2)).is_empty());
     // nobody is left who would take it
     let alone = Installation::of(&[&a, &b, &c]);
     assert!((0..3).all(|k| alone.priors(Some(k)).is_empty()));
