@@ -451,7 +451,7 @@ fn ctrl_c_ends_long_tasks_with_status_130_and_nothing_written() {
             .unwrap();
         let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
         // the first line is of the log, which is read before anything can be cancelled
-        let stage = lines.find(|line| !line.starts_with("log 1")).unwrap();
+        let stage = lines.find(|line| !line.starts_with("reading and reconstructing")).unwrap();
         let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
         assert!(kill.success(), "{task:?} had ended after {stage:?}");
         let said: Vec<String> = lines.collect();

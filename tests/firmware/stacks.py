@@ -143,6 +143,7 @@ class ArduPlane:
 
     def __init__(self):
         self.simulator = self.firmware = self.station = self.relay = None
+        self.high = 0.0
 
     def start(self, arguments, room, parameters):
         """Starts simulator and firmware, and listens to it."""
@@ -152,7 +153,10 @@ class ArduPlane:
         )
         home = self.simulator.wait_for("--home", 20.0).split("--home")[1].split()[0].strip("`,;)")
         file = room / "acceptance.parm"
-        file.write_text("".join(f"{k} {v:g}\n" for k, v in {**ARDUPLANE, **parameters}.items()))
+        settings = {**ARDUPLANE, **parameters}
+        # turbulence carries an aircraft far down or up in fifty engagements: TKOFF_ALT=500 leaves room
+        self.high = 0.8 * settings["TKOFF_ALT"]
+        file.write_text("".join(f"{k} {v:g}\n" for k, v in settings.items()))
         command = [pathlib.Path(arguments.firmware).resolve(), "--wipe", "--model", "JSON:127.0.0.1"]
         self.firmware = Program(
             "arduplane", [*command, "--home", home, "--defaults", file, "--speedup", 1], cwd=room
@@ -164,8 +168,8 @@ class ArduPlane:
     def take_off(self):
         """Thrown by the catapult; climbs, then loiters."""
         station = self.station
-        end = time.monotonic() + 180.0
-        while not any("is using GPS" in text for text in station.texts) and time.monotonic() < end - 140.0:
+        end = time.monotonic() + 300.0
+        while not any("is using GPS" in text for text in station.texts) and time.monotonic() < end - 260.0:
             station.run(1.0)
         while not station.modes or station.mode() != 13:
             check(time.monotonic() < end, "ArduPlane does not go to TAKEOFF")
@@ -176,7 +180,7 @@ class ArduPlane:
             check(time.monotonic() < end, "ArduPlane does not arm")
             station.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1, wait=False)
             station.run(1.0)
-        while station.height() < 80.0:
+        while station.height() < self.high:
             check(time.monotonic() < end, "ArduPlane does not climb")
             station.run(1.0)
         self.to_mode(self.hold)
