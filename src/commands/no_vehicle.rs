@@ -38,14 +38,21 @@ pub fn tell(summary: &mut Summary) {
     if summary.vehicle.states > 0 {
         return;
     }
-    let heard = summary.vehicle.frames.good > 0;
-    let empty = |rows: u64| rows == 0 && !heard;
-    let recording = summary.recording.take_if(|(_, written)| empty(written.rows));
-    let removed = recording.filter(|(folder, _)| fs::remove_dir_all(folder).is_ok());
-    let and = if removed.is_some() { "; the empty recording was removed" } else { "" };
-    match heard {
-        true => say(format_args!("no vehicle was seen: it sends MAVLink, but no state to fly by")),
-        false => say(format_args!("no vehicle was seen{and}")),
+    let (frames, clients) = (summary.vehicle.frames, summary.clients.frames);
+    let (heard, garbled) = (frames.good > 0, frames.bad() > 0);
+    let silent = !heard && !garbled && clients.good == 0;
+    let removed = summary.recording.take_if(|(folder, written)| {
+        silent && written.rows == 0 && fs::remove_dir_all(folder).is_ok()
+    });
+    match (heard, garbled) {
+        (true, _) => say(format_args!("MAVLink was received, but no state of a vehicle to fly by")),
+        (false, true) => say(format_args!(
+            "no vehicle was seen: bytes arrive, but no valid MAVLink frame; check the baud rate"
+        )),
+        (false, false) if removed.is_some() => {
+            say(format_args!("no vehicle was seen; the empty recording was removed"))
+        }
+        (false, false) => say(format_args!("no vehicle was seen")),
     }
 }
 

@@ -133,7 +133,9 @@ pub fn check(model: &GreyBox) -> Result<AircraftCheck, CheckError> {
         findings: Vec::new(),
     };
     check.findings = findings(model, &check, speeds.count());
-    check.findings.extend(design.err().map(|why| undesigned(&why)));
+    if let Err(why) = design {
+        check.findings.insert(0, undesigned(&why));
+    }
     Ok(check)
 }
 
@@ -184,6 +186,11 @@ fn range(values: impl Iterator<Item = f64> + Clone, places: usize) -> String {
     if least == most { least } else { format!("{least} to {most}") }
 }
 
+/// The airspeeds of `levels`, m/s, as text.
+fn airspeeds<'a>(levels: impl Iterator<Item = &'a Level>) -> String {
+    levels.map(|l| format!("{:.1}", l.airspeed)).collect::<Vec<_>>().join(", ")
+}
+
 /// Findings on straight flight over the airspeeds, one for each cause.
 fn findings_in_levels(model: &GreyBox, levels: &[Level]) -> Vec<String> {
     let mut out = Vec::new();
@@ -192,7 +199,7 @@ fn findings_in_levels(model: &GreyBox, levels: &[Level]) -> Vec<String> {
         out.push(format!(
             "straight flight at {} m/s takes {} % of the elevator's travel: move the centre of gravity or correct Cm0, \
              Cmalpha and Cmde",
-            range(strained.clone().map(|l| l.airspeed), 1),
+            airspeeds(strained.clone()),
             range(strained.map(|l| 100.0 * l.elevator.abs()), 0)
         ));
     }
@@ -204,7 +211,7 @@ fn findings_in_levels(model: &GreyBox, levels: &[Level]) -> Vec<String> {
         out.push(format!(
             "full throttle does not hold level flight at {} m/s: it descends by {} degrees; correct thrust, drag or the \
              envelope",
-            range(sinking.clone().map(|l| l.airspeed), 1),
+            airspeeds(sinking.clone()),
             range(sinking.map(|l| -l.path.to_degrees()), 1)
         ));
     }
@@ -212,7 +219,7 @@ fn findings_in_levels(model: &GreyBox, levels: &[Level]) -> Vec<String> {
     if braked.clone().next().is_some() {
         out.push(format!(
             "straight flight at {} m/s takes {} % of throttle, which is impossible: correct thrust and drag",
-            range(braked.clone().map(|l| l.airspeed), 1),
+            airspeeds(braked.clone()),
             range(braked.map(|l| 100.0 * l.throttle), 0)
         ));
     }

@@ -174,11 +174,16 @@ pub(super) fn named(
 ) -> Finding {
     let Some(cure) = &finding.cure else { return choices_named(finding, entries, format) };
     let (Cure { column, scale, .. }, said) = (cure, cure.to_string());
-    let (Some(entry), Some(line)) = (entries.get(column), cure.line_of(entries, format)) else {
-        let better = format!(
+    let several = match &cure.exchanged_with {
+        Some(other) => format!(
+            "{column} or {other} is computed from several fields, so that no mapping exchanges them: name other fields in a mapping (--mapping)"
+        ),
+        None => format!(
             "{column} is computed from several fields or from servo pulses, so that no factor in a mapping corrects it: state what the outputs drive in [surfaces] of an airframe file (--airframe), or name another field in a mapping (--mapping)"
-        );
-        return Finding { text: finding.text.replace(&said, &better), cure: None, ..finding };
+        ),
+    };
+    let (Some(entry), Some(line)) = (entries.get(column), cure.line_of(entries, format)) else {
+        return Finding { text: finding.text.replace(&said, &several), cure: None, ..finding };
     };
     if near_degree(entry.scale) && near_degree(*scale) {
         return Finding::warning(format!(

@@ -93,6 +93,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     println!("wrote {} and {}", page.display(), folder.join("fit.html").display());
     further(folder, logs)?;
     found.findings.iter().take(SAID).for_each(|finding| println!("correct: {finding}"));
+    if found.findings.len() > SAID {
+        println!("and {} more, in {}", found.findings.len() - SAID, page.display());
+    }
     print_next(&next(&fitted, logs, &found.findings));
     Ok(status)
 }

@@ -10,6 +10,8 @@ const CONTROLS: [(&str, &str); 3] = [
     ("roll_linear.Clda", "aileron"),
     ("rudder_linear.Cndr", "rudder"),
 ];
+/// Magnitude of a control derivative below which the control has no effect.
+const NO_EFFECT: f64 = 1e-6;
 /// Thrust as a multiple of the weight above which it is absurd.
 const WEIGHTS: f64 = 5.0;
 
@@ -17,34 +19,42 @@ const WEIGHTS: f64 = 5.0;
 pub fn notes(story: &Amendment, model: &GreyBox) -> Vec<String> {
     let fitted = &story.parameters;
     let weight = model.body.mass * STANDARD_GRAVITY;
-    without_effect(fitted).into_iter().chain(absurd_thrust(fitted, weight)).collect()
+    let given = model.coefficients();
+    let given = |name: &str| given.iter().find(|c| c.name == name).map_or(0.0, |c| c.value);
+    without_effect(fitted).into_iter().chain(absurd_thrust(fitted, given, weight)).collect()
 }
 
 /// Note on controls whose effect ended at zero; `None` if every control has an effect.
 pub fn without_effect(fitted: &[Parameter]) -> Option<String> {
     let dead = |(name, control): &(&str, &str)| {
-        let zero = fitted.iter().any(|p| p.name == *name && p.value == 0.0);
+        let zero = fitted.iter().any(|p| p.name == *name && p.value.abs() < NO_EFFECT);
         zero.then(|| format!("{name} ({control})"))
     };
     let dead: Vec<String> = CONTROLS.iter().filter_map(dead).collect();
     (!dead.is_empty()).then(|| {
         format!(
-            "The model cannot be flown: {} ended at zero, so the control has no effect. Check the order and the signs of the \
+            "problem: The model cannot be flown: {} ended at zero, so the control has no effect. Check the order and the signs of the \
              commands in the log.",
             dead.join(" and ")
         )
     })
 }
 
-fn absurd_thrust(fitted: &[Parameter], weight: f64) -> Option<String> {
-    let of = |name: &str| fitted.iter().find(|p| p.name == name).map_or(0.0, |p| p.value);
+/// Note on a thrust far above `weight` (N). `given` is the value of a coefficient that was not fitted.
+fn absurd_thrust(fitted: &[Parameter], given: impl Fn(&str) -> f64, weight: f64) -> Option<String> {
+    if !fitted.iter().any(|p| p.name.starts_with("propeller.")) {
+        return None;
+    }
+    let of = |name: &str| {
+        fitted.iter().find(|p| p.name == name).map_or_else(|| given(name), |p| p.value)
+    };
     let [idle, slope, curvature] = ["propeller.T0_n", "propeller.Tt_n", "propeller.Ttt_n"].map(of);
     let at_rest = [("at full throttle", idle + slope + curvature), ("without throttle", idle)];
     let (throttle, thrust) = at_rest.into_iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
     let ratio = thrust.abs() / weight;
     (ratio > WEIGHTS).then(|| {
         format!(
-            "The fitted thrust is absurd: at rest {throttle} it is {thrust:.0} N, {ratio:.0} times the weight. Fly throttle \
+            "warning: The fitted thrust is absurd: at rest {throttle} it is {thrust:.0} N, {ratio:.0} times the weight. Fly throttle \
              steps at two airspeeds."
         )
     })
@@ -82,11 +92,15 @@ mod tests {
     #[test]
     fn a_thrust_of_many_times_the_weight_is_absurd() {
         let weight = 3.4 * STANDARD_GRAVITY;
-        let said = absurd_thrust(&[fitted("propeller.T0_n", 4477.0)], weight).unwrap();
+        let none = |_: &str| 0.0;
+        let said = absurd_thrust(&[fitted("propeller.T0_n", 4477.0)], none, weight).unwrap();
         assert!(said.contains("without throttle it is 4477 N, 134 times the weight"), "{said}");
         // slope and curvature make up for each other
         let usual = [fitted("propeller.Tt_n", 400.0), fitted("propeller.Ttt_n", -360.0)];
-        assert_eq!(absurd_thrust(&usual, weight), None);
-        assert_eq!(absurd_thrust(&[], weight), None);
+        assert_eq!(absurd_thrust(&usual, none, weight), None);
+        let held = |name: &str| if name == "propeller.Ttt_n" { -360.0 } else { 0.0 };
+        assert_eq!(absurd_thrust(&usual[..1], held, weight), None);
+        assert!(absurd_thrust(&usual[..1], none, weight).is_some());
+        assert_eq!(absurd_thrust(&[], |_| 1e6, weight), None);
     }
 }

@@ -308,6 +308,11 @@ mod tests {
         let first = level.fly(0.01, |frame| frame.state.alpha += 0.19);
         assert!(level.error(first) < 0.5, "{first:?}");
         assert_eq!(level.changes(), [true]);
+        let mut level = Level::new();
+        level.fly(1.0, |_| ());
+        let first = level.fly(0.01, |frame| frame.state.airspeed = 28.0);
+        assert!(level.error(first) < 1e-6, "{first:?}");
+        assert_eq!(level.changes(), [true]);
     }
 
     #[test]

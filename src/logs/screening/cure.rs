@@ -24,7 +24,7 @@ pub fn tried(
     let one = |finding: Finding| match &finding.cure {
         Some(cure) if !cures(cure) => {
             let said = format!("{BETWEEN}{cure}");
-            let why = ". No factor puts it right: look at the flight at these times, or name another source in a mapping";
+            let why = ". No such correction puts it right: look at the flight at these times, or name another source in a mapping";
             let text = finding.text.replace(&said, why);
             Finding { text, cure: None, ..finding }
         }

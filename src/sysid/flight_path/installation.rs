@@ -69,6 +69,8 @@ struct Unshared {
     shown: Vec<usize>,
     chi_square: f64,
     degrees: usize,
+    /// Whether a single flight contradicts the others.
+    is_apart: bool,
 }
 
 impl Installation {
@@ -108,7 +110,8 @@ impl Installation {
         if mean.value.abs() > CLEARLY * mean.sd && is_taken {
             self.common.push(Common { name, members, mean, is_lacking: lacking > 0, apart });
         } else if degrees > 0 {
-            self.unshared.push(Unshared { name, shown, chi_square, degrees });
+            let is_apart = !apart.is_empty();
+            self.unshared.push(Unshared { name, shown, chi_square, degrees, is_apart });
         }
     }
 
@@ -151,12 +154,14 @@ impl Unshared {
     fn sentence(&self, names: &[&str]) -> String {
         let shown = listed(names, self.shown.iter().copied());
         let plural = if self.degrees == 1 { "" } else { "s" };
-        let why = match chi_square_tail(self.chi_square, self.degrees) < CONTRADICTION {
-            true => format!(
+        let together = chi_square_tail(self.chi_square, self.degrees) < CONTRADICTION;
+        let why = match (together, self.is_apart) {
+            (true, _) => format!(
                 "the flights contradict each other (chi-square {:.1} with {} degree{plural} of freedom)",
                 self.chi_square, self.degrees
             ),
-            false => "the flights together do not determine it".to_owned(),
+            (false, true) => "the data of the other flights contradict it".to_owned(),
+            (false, false) => "the flights together do not determine it".to_owned(),
         };
         format!("{} is shown by {shown}, but {why}: each keeps its own estimate.", self.name)
     }

@@ -23,7 +23,7 @@ pub fn gain(n: &Numbers) -> String {
         Some(_) => "that forecast".into(),
         None => format!("a forecast without aerodynamics ({name}, {})", number(*error)),
     };
-    format!(" Against {forecast} the change is {change}.")
+    format!(" Relative to {forecast} the error changes by {change}.")
 }
 
 impl Answer {
@@ -62,12 +62,12 @@ mod tests {
     #[test]
     fn a_small_gain_over_straight_flight_is_no_success() {
         let little = answer(0.752, 0.139, 0.142);
-        let end = "(−82 %). Against that forecast the change is −2.1 %.";
+        let end = "(−82 %). Relative to that forecast the error changes by −2.1 %.";
         assert!(little.error.ends_with(end), "{}", little.error);
         let better = answer(0.14, 0.139, 0.142).error;
-        let end = "Against a forecast without aerodynamics (fly straight on, 0.142) the change is −2.1 %.";
+        let end = "Relative to a forecast without aerodynamics (fly straight on, 0.142) the error changes by −2.1 %.";
         assert!(better.ends_with(end), "{better}");
-        let summary = "error at 5 s 0.752 → 0.139 (−82 %; −2.1 % beside \"fly straight on\")";
+        let summary = "error at 5 s 0.752 → 0.139 (−82 %; −2.1 % relative to \"fly straight on\")";
         assert_eq!(little.summary(), summary);
         assert!(little.gains_nothing());
         let clear = answer(0.752, 0.02, 0.142);

@@ -364,8 +364,8 @@ mod tests {
         assert_eq!(
             cured.error,
             "As given, the model is worse than a forecast without aerodynamics (fly straight on, 0.3). On the 2 flights that \
-             it was fitted to, the error at 5 s falls from 0.5 to 0.2 by tuning (−60 %). Against that \
-             forecast the change is −33 %."
+             it was fitted to, the error at 5 s falls from 0.5 to 0.2 by tuning (−60 %). Relative to \
+             that forecast the error changes by −33 %."
         );
         assert!(!cured.behind_baseline());
         // of a better model nothing is said about straight flight, whatever tuning does to it

@@ -261,7 +261,7 @@ pub fn summary(n: &Numbers) -> String {
                 number(last.error),
                 percent(n.change_percent),
                 small_gain(n)
-                    .map_or(String::new(), |(p, b)| format!("; {p} beside \"{}\"", b.name))
+                    .map_or(String::new(), |(p, b)| format!("; {p} relative to \"{}\"", b.name))
             )
         }
     }
