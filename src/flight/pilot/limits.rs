@@ -18,6 +18,9 @@ const ARREST_PITCH: f64 = 5.0 * DEGREE;
 /// 9.2 m/s for the X8), so the aircraft would stall at a load factor of 2. The airspeed must also be at least 1.2 times the
 /// stall speed of the turn, which reduces the load factor to 2 / 1.2².
 const LOAD_AT_MINIMUM: f64 = 2.0 / 1.44;
+/// Part of the largest load factor that a level turn may take. The envelope limiter allows 96 % of the largest; in a turn that takes
+/// as much the nose could not be raised again.
+const LEVEL_SHARE: f64 = 0.93;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// Limits in SI units and radians.
@@ -59,10 +62,10 @@ impl From<&Config> for Limits {
 
 impl Limits {
     /// The bank limit of a level turn at the true airspeed `airspeed` (m/s), rad. The load factor 1/cos φ of the turn must exceed
-    /// neither `load_max` nor the load factor that the lift allows, which grows as V².
+    /// neither the part [`LEVEL_SHARE`] of `load_max` nor the load factor that the lift allows, which grows as V².
     pub fn bank_limit(&self, airspeed: f64) -> f64 {
         let lift = LOAD_AT_MINIMUM * (airspeed / self.airspeed_min).powi(2);
-        let load = lift.min(self.load_max).max(1.0);
+        let load = lift.min(LEVEL_SHARE * self.load_max).max(1.0);
         (1.0 / load).acos().min(self.bank_max)
     }
 
@@ -156,9 +159,9 @@ mod tests {
 
     #[test]
     fn the_load_limit_binds_where_the_bank_limit_is_wide() {
-        // A bank of 80° has a load factor of 5.8. The limit of 2.2 allows acos(1 / 2.2) = 62.96°.
+        // A bank of 80° has a load factor of 5.8. The limit of 2.2 allows acos(1 / (0.93 · 2.2)) = 60.74°.
         let envelope = Limits { bank_max: 80f64.to_radians(), ..x8() };
-        assert!((envelope.bank_limit(40.0).to_degrees() - 62.96).abs() < 0.01);
+        assert!((envelope.bank_limit(40.0).to_degrees() - 60.74).abs() < 0.01);
     }
 
     #[test]
