@@ -40,8 +40,10 @@ fn found(bytes: &[u8], mapping: &str) -> String {
     }
 }
 
+/// Spoils a row of the log.
+type Change = fn(&mut Sample);
 /// A spoiled column, the words that name it, and the mapping that cures it.
-type Case = (fn(&mut Sample), &'static str, &'static str);
+type Case = (Change, &'static str, &'static str);
 
 const DEGREE: f64 = 57.295_779_513;
 
@@ -150,7 +152,7 @@ fn each_wrong_column_is_named_and_its_cure_cures_it() {
 
 #[test]
 fn a_command_that_moves_with_a_reversed_deflection_is_corrected_with_it() {
-    let cases: [(fn(&mut Sample), &str); 2] = [
+    let cases: [(Change, &str); 2] = [
         (|s| (s.aileron_rad, s.aileron_cmd) = (-s.aileron_rad, -s.aileron_cmd), "aileron"),
         (|s| (s.elevator_rad, s.elevator_cmd) = (-s.elevator_rad, -s.elevator_cmd), "elevator"),
     ];
