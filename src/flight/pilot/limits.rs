@@ -62,7 +62,7 @@ impl From<&Config> for Limits {
 
 impl Limits {
     /// The bank limit of a level turn at the true airspeed `airspeed` (m/s), rad. The load factor 1/cos φ of the turn must exceed
-    /// neither the part [`LEVEL_SHARE`] of `load_max` nor the load factor that the lift allows, which grows as V².
+    /// neither 93 % of `load_max` nor the load factor that the lift allows, which grows as V².
     pub fn bank_limit(&self, airspeed: f64) -> f64 {
         let lift = LOAD_AT_MINIMUM * (airspeed / self.airspeed_min).powi(2);
         let load = lift.min(LEVEL_SHARE * self.load_max).max(1.0);
