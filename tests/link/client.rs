@@ -772,7 +772,7 @@ fn each_kind_of_input_that_cannot_be_used_is_logged() {
             clients.poll(at_ms(0), &mut double);
         });
         let (said, summary): (Vec<_>, Vec<_>) =
-            lines.iter().partition(|line| line.contains("told a client: "));
+            lines.iter().partition(|line| line.contains("status text to a client: "));
         assert!(summary.len() == 1 && summary[0].contains(field), "{field}: {lines:?}");
         // the client has the cause as a text, and so has the log
         assert_eq!(said.len(), usize::from(field.contains("setpoints")), "{field}: {lines:?}");
@@ -800,7 +800,7 @@ fn a_flood_of_bad_input_is_logged_once_in_ten_seconds() {
         });
         sent(&mut clients);
         let (words, summary): (Vec<_>, Vec<_>) =
-            said.into_iter().partition(|line| line.contains("told a client: "));
+            said.into_iter().partition(|line| line.contains("status text to a client: "));
         told.extend(words);
         lines.extend(summary.into_iter().map(|line| (ms, line)));
     }

@@ -164,7 +164,7 @@ impl AirDataCheck {
         ];
         let corrected = self.reference.alpha(curve, frame, measured[0], airspeed);
         // a gust that makes the vane jump makes the lift jump too
-        let at_once = curve.measured(frame, airspeed).filter(|_| jumped[0]);
+        let at_once = jumped[0].then(|| curve.measured(frame, airspeed)).flatten();
         let lift = [
             at_once.unwrap_or(corrected),
             airspeed_by_lift(curve, frame, alpha).unwrap_or(measured[1]),

@@ -13,7 +13,7 @@ impl Refusals {
     /// Logs the refusal `words` unless one of its kind was logged before.
     pub fn log(&mut self, words: &str) {
         if self.is_new(words) {
-            tracing::warn!("told a client: {words}");
+            tracing::warn!("status text to a client: {words}");
         }
     }
 
