@@ -232,6 +232,7 @@ fn slewed(before: Command, wanted: Command) -> Command {
 fn observe(step: usize, truth: &Truth, [p, q, r]: [f64; 3]) -> Observation {
     Observation {
         time: Time::from_micros(1000 * step as u64),
+        incidence_sd: [0.0; 2],
         state: State {
             roll: truth.roll_rad,
             pitch: truth.pitch_rad,

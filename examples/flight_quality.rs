@@ -161,6 +161,7 @@ impl World {
         let t = &self.truth;
         Observation {
             time: Time::from_micros((t.time_s * 1e6).round() as u64),
+            incidence_sd: [0.0; 2],
             state: State {
                 roll: t.roll_rad,
                 pitch: t.pitch_rad,

@@ -71,6 +71,7 @@ fn request(altitude: f64, engage: bool) -> Request {
     let observation = Observation {
         time: Time::default(),
         state: State::NEUTRAL,
+        incidence_sd: [0.0; 2],
         actuators: ActuatorState::default(),
         altitude,
         previous: [Command::IDLE; 2],

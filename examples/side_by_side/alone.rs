@@ -85,6 +85,7 @@ fn act(width: usize) -> Result<()> {
     let mut seen = Observation {
         time: Time::default(),
         state: State::NEUTRAL,
+        incidence_sd: [0.0; 2],
         actuators: ActuatorState::default(),
         altitude: 600.0,
         previous: [Command::IDLE; 2],

@@ -188,6 +188,7 @@ impl Scoring {
             seen: Observation {
                 time: Time::default(),
                 state: State { alpha: 0.05, ..State::NEUTRAL },
+                incidence_sd: [0.0; 2],
                 actuators: ActuatorState::default(),
                 altitude: 600.0,
                 previous: [Command::IDLE; 2],

@@ -6,9 +6,9 @@ use std::process::ExitCode;
 use anyhow::{Result, bail};
 use clap::Args;
 
-use crate::commands::files;
 use crate::commands::recording_report::{Reporter, read, segments, sights};
 use crate::commands::replay::{Again, FlownArguments};
+use crate::commands::{files, outputs};
 use crate::control::Pace;
 
 /// The arguments of `greylag report`.
@@ -41,7 +41,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     let page = arguments.out.clone().unwrap_or_else(|| folder.join("report.html"));
     let overwrite = arguments.force.into();
-    files::writable(&page, overwrite)?;
+    let recording = std::fs::read_dir(folder)?.flatten().map(|entry| entry.path());
+    let recording = recording.filter(|path| path.extension().is_none_or(|e| e != "html"));
+    outputs::check([&page], recording, overwrite)?;
     let flight = read(folder)?;
     let Again { controller, model, model_file, companion, vehicle } =
         arguments.flown.again(folder)?;

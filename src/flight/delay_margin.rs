@@ -95,6 +95,7 @@ fn swings(
         let seen = Observation {
             time: Time::from_micros(10_000 * tick as u64),
             state: twin.state,
+            incidence_sd: [0.0; 2],
             actuators: thought.observed(figures),
             altitude: twin.altitude,
             previous,

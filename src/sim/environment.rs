@@ -85,6 +85,7 @@ impl Imagined {
         Observation {
             time: Time::from_micros(self.steps * 10_000),
             state: self.twin.state,
+            incidence_sd: [0.0; 2],
             actuators: self.twin.actuators.observed(&self.model.airframe.actuators),
             altitude: self.twin.altitude,
             previous: self.previous,

@@ -174,6 +174,7 @@ mod tests {
             Observation {
                 time: Time::default(),
                 state: State { roll, pitch, ..State::NEUTRAL },
+                incidence_sd: [0.0; 2],
                 actuators: ActuatorState::default(),
                 altitude: 600.0,
                 previous: [Command::IDLE; 2],

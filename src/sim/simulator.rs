@@ -38,6 +38,7 @@ impl Simulator {
     fn observe(&self, truth: &Truth) -> Observation {
         Observation {
             time: Time::from_micros((truth.time_s * 1e6).round() as u64),
+            incidence_sd: [0.0; 2],
             state: State {
                 roll: truth.roll_rad,
                 pitch: truth.pitch_rad,

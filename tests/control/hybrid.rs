@@ -49,6 +49,7 @@ fn seen() -> Observation {
     Observation {
         time: Time::default(),
         state: State { roll: 0.1, alpha: 0.04, ..State::NEUTRAL },
+        incidence_sd: [0.0; 2],
         actuators: ActuatorState { throttle: 0.3, ..ActuatorState::default() },
         altitude: 600.0,
         previous: [Command { throttle: 0.3, ..Command::IDLE }; 2],

@@ -1,13 +1,17 @@
 //! The companion at played PX4 and ArduPilot controllers, in lockstep in this process.
 
 use crate::controller_support::{Bench, STEP};
+use greylag::control::envelope::EnvelopeLimiter;
 use greylag::link::autopilot::Verdict;
 use greylag::link::vehicle::Authority;
+use greylag::model::GreyBox;
 use greylag_sitl::air::{Air, Turbulence};
 use greylag_sitl::plant::Truth;
 use greylag_sitl::shim::controller::{FlightController, Mode};
 use greylag_sitl::shim::{Distortion, Noise, Personality};
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavType};
+
+use std::path::Path;
 
 use crate::flight_support;
 use Authority::{Attitude, Surfaces};
@@ -108,6 +112,97 @@ fn angles_of_attack_and_sideslip_are_estimated() {
         // the vertical gusts themselves, 1 m/s in 20, are 3°: who sees none of them errs by as much.
         let bound = if rough { 3.0 } else { 1.0 };
         assert!(alpha < bound && beta < bound);
+    }
+}
+
+/// A flight of 90 s between attitudes in light turbulence, beside a controller without vanes.
+struct Limited {
+    /// Share of the time in which the envelope limiter did not act because its model predicted wrongly.
+    resting: f64,
+    /// Share of the states with more than the largest load factor of the X8, 2.2 g.
+    beyond: f64,
+    /// Largest load factor, g.
+    load: f64,
+    /// Largest error of roll or pitch in the last 2 s of a target, degrees.
+    off_deg: f64,
+}
+
+/// Flies with an LQI of the exact model, whose commands a limiter with `model` limits. `None`: without a limiter.
+fn limited(personality: Personality, model: Option<&str>, seed: u32) -> Limited {
+    let mut bench = Bench::new(personality, Surfaces, |options| {
+        options.noise = Noise::REALISTIC;
+        options.seed = seed.into();
+        options.plant.seed = seed;
+        options.plant.air = Air {
+            wind_ned_mps: [4.0, -2.0, 0.0],
+            turbulence: Some(Turbulence { wind_20ft_mps: 23.0, severity: 3 }),
+            gusts: vec![],
+        };
+    });
+    if let Some(model) = model {
+        let model = GreyBox::load(&Path::new("params/x8").join(model)).unwrap();
+        bench.desk.pilot().protect_with(EnvelopeLimiter::new(&model));
+    }
+    bench.run(6.0);
+    bench.engage(0.0, 3.0);
+    let (mut resting, mut off_deg) = (0, 0.0f64);
+    for k in 0..900 {
+        let targets = [(0.0, 3.0), (40.0, 5.0), (-40.0, 10.0), (0.0, -10.0), (20.0, 0.0)];
+        let (roll, pitch) = targets[k / 60 % 5];
+        bench.steer(roll, pitch, 0.1);
+        let limiter = bench.desk.pilot().protection();
+        resting += usize::from(limiter.is_some_and(EnvelopeLimiter::distrusts));
+        if k % 60 >= 40 {
+            let truth = &bench.seen[bench.seen.len() - 1].truth;
+            let off = [truth.roll_rad.to_degrees() - roll, truth.pitch_rad.to_degrees() - pitch];
+            off_deg = off.iter().fold(off_deg, |most, off| most.max(off.abs()));
+        }
+    }
+    assert!(bench.said("engaged") && !bench.said("hand"), "{:?}", bench.texts());
+    let loads = bench.seen[600..].iter().map(|seen| -seen.truth.specific_force_mps2[2] / 9.81);
+    Limited {
+        resting: resting as f64 / 900.0,
+        beyond: loads.clone().filter(|load| *load > 2.2).count() as f64 / loads.len() as f64,
+        load: loads.fold(0.0, f64::max),
+        off_deg,
+    }
+}
+
+#[test]
+fn in_turbulence_without_vanes_the_limiter_rests_with_a_wrong_model_only() {
+    for personality in [Px4, Ardupilot] {
+        for seed in [11, 12] {
+            let [exact, wrong] = ["jsbsim.toml", "prior-as-printed.toml"]
+                .map(|model| limited(personality, Some(model), seed));
+            assert!(exact.resting < 0.01 && wrong.resting > 0.5);
+            // what is beyond with the exact model is gusts; the wrong one does not limit
+            assert!(exact.beyond < 0.5 * wrong.beyond && exact.load < 2.6);
+            assert!(exact.off_deg < 5.0, "{}", exact.off_deg);
+        }
+    }
+}
+
+/// Prints the figures of `docs/validation/figures.md`.
+#[test]
+#[ignore = "eight minutes"]
+fn in_turbulence_without_vanes_forty_flights_for_each_model() {
+    let models = ["jsbsim.toml", "prior.toml", "prior-mild.toml", "prior-severe.toml"];
+    let models = models.into_iter().chain(["prior-as-printed.toml"]).map(Some);
+    for model in models.chain([None]) {
+        let flights: Vec<Limited> =
+            (0..20).flat_map(|k| [Px4, Ardupilot].map(|it| limited(it, model, 7000 + k))).collect();
+        let mean = |of: fn(&Limited) -> f64| flights.iter().map(of).sum::<f64>() / 40.0;
+        let most = |of: fn(&Limited) -> f64| flights.iter().map(of).fold(0.0, f64::max);
+        println!(
+            "{}: rests {:.1} % (most {:.1}); beyond 2.2 g {:.2} %, {:.2} g at most; off by {:.1} degrees at most, {:.1} in the mean flight",
+            model.unwrap_or("no limiter"),
+            100.0 * mean(|x| x.resting),
+            100.0 * most(|x| x.resting),
+            100.0 * mean(|x| x.beyond),
+            most(|x| x.load),
+            most(|x| x.off_deg),
+            mean(|x| x.off_deg),
+        );
     }
 }
 

@@ -72,6 +72,7 @@ fn flown(kind: ControllerKind, model: &GreyBox) -> Vec<f64> {
         let seen = Observation {
             time: Time::from_micros(10_000 * u64::from(tick)),
             state: twin.state,
+            incidence_sd: [0.0; 2],
             actuators: twin.actuators.observed(&model.airframe.actuators),
             altitude: twin.altitude,
             previous,

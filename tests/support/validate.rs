@@ -93,6 +93,7 @@ pub fn pid(roll: f64, pitch: f64) -> Vec<Command> {
             let seen = control::Observation {
                 time: greylag::physics::Time::default(),
                 state: state(&truth),
+                incidence_sd: [0.0; 2],
                 actuators: Default::default(),
                 altitude: truth.altitude_m,
                 previous: [Command::IDLE; 2],

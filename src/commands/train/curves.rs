@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail};
 use comfy_table::Table;
 
 use crate::commands::files::{self, Overwrite};
+use crate::commands::outputs;
 use crate::learn::policy::learning_curve::{self, CURVE, CurvePoint, best};
 use crate::logs::quoted;
 use crate::report::{LearningReport, Training};
@@ -31,9 +32,9 @@ pub struct Arguments {
 /// Prints the results of the trainings and, with `--report`, draws their curves.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = Overwrite::from(arguments.force);
-    if let Some(path) = &arguments.report {
-        files::writable(path, overwrite)?;
-    }
+    let seeds = arguments.folders.iter().flat_map(|folder| folders_of_seeds(folder)).flatten();
+    let curves = seeds.map(|(_, folder)| folder.join(CURVE));
+    outputs::check(&arguments.report, curves, overwrite)?;
     let trainings =
         arguments.folders.iter().map(|f| training(f)).collect::<Result<Vec<Training>>>()?;
     let report = report("Learning curves", &arguments.folders, &trainings);
@@ -86,33 +87,36 @@ fn next(folders: &[PathBuf], trainings: &[Training]) -> String {
     })
 }
 
-/// Reads the curve in `folder` or, if there is none, the curves in its subfolders `seed-N`.
+/// The folders with a learning curve, each with its seed: `folder` itself, whose seed is unknown, or its subfolders `seed-N`.
+fn folders_of_seeds(folder: &Path) -> Result<Vec<(Option<u64>, PathBuf)>> {
+    if folder.join(CURVE).exists() {
+        return Ok(vec![(None, folder.to_owned())]);
+    }
+    let mut seeds = Vec::new();
+    let entries = folder.read_dir().with_context(|| format!("cannot read {}", folder.display()))?;
+    for entry in entries {
+        let entry = entry?;
+        let seed = entry
+            .file_name()
+            .to_string_lossy()
+            .strip_prefix(SEED)
+            .and_then(|s| s.parse::<u64>().ok());
+        seeds.extend(
+            seed.filter(|_| entry.path().join(CURVE).exists())
+                .map(|seed| (Some(seed), entry.path())),
+        );
+    }
+    seeds.sort();
+    Ok(seeds)
+}
+
+/// Reads the learning curves in `folder`, see [`folders_of_seeds`].
 fn training(folder: &Path) -> Result<Training> {
     let name = folder
         .file_name()
         .map_or_else(|| folder.display().to_string(), |n| n.to_string_lossy().into());
-    let mut seeds = Vec::new();
-    if folder.join(CURVE).exists() {
-        seeds.push((None, folder.to_owned()));
-    } else {
-        let entries =
-            folder.read_dir().with_context(|| format!("cannot read {}", folder.display()))?;
-        for entry in entries {
-            let entry = entry?;
-            let seed = entry
-                .file_name()
-                .to_string_lossy()
-                .strip_prefix(SEED)
-                .and_then(|s| s.parse::<u64>().ok());
-            seeds.extend(
-                seed.filter(|_| entry.path().join(CURVE).exists())
-                    .map(|seed| (Some(seed), entry.path())),
-            );
-        }
-    }
-    seeds.sort();
     let mut read = Vec::new();
-    for (seed, folder) in seeds {
+    for (seed, folder) in folders_of_seeds(folder)? {
         let points = learning_curve::read(&folder.join(CURVE))?;
         // the folder of a training with a single seed does not state that seed
         let seed = seed.map_or("–".into(), |seed| seed.to_string());

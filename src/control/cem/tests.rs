@@ -20,6 +20,7 @@ fn a_search_does_not_start_from_candidates_of_a_failed_one() {
     let seen = Observation {
         time: Time::default(),
         state: State::NEUTRAL,
+        incidence_sd: [0.0; 2],
         actuators: ActuatorState::default(),
         altitude: 600.0,
         previous: [Command::IDLE; 2],

@@ -153,6 +153,11 @@ impl EnvelopeLimiter {
         self.disturbance = Disturbance::new(TIME_CONSTANT_S);
     }
 
+    /// Whether the recent predictions of the model were wrong, so that no command is limited.
+    pub fn distrusts(&self) -> bool {
+        self.disturbance.is_wrong(TRUST)
+    }
+
     /// The command nearest to `wanted` that stays inside the envelope. To be called once per tick with the command that would
     /// be flown without limits. `wanted` is returned unchanged if it is not finite, or if the model recently predicted wrongly.
     pub fn limit(&mut self, seen: &Observation, wanted: Command) -> Limited {
@@ -160,7 +165,7 @@ impl EnvelopeLimiter {
         if !wanted.is_finite() {
             return Limited { command: wanted, by: None };
         }
-        if self.disturbance.is_wrong(TRUST) {
+        if self.distrusts() {
             return Limited { command: wanted, by: Some(Limit::Distrust) };
         }
         let mut out = Limited { command: wanted.clamped(), by: None };

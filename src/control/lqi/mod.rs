@@ -241,6 +241,7 @@ mod tests {
         let seen = |roll: f64| Observation {
             time: Time::default(),
             state: State { roll, ..State::NEUTRAL },
+            incidence_sd: [0.0; 2],
             actuators: ActuatorState::default(),
             altitude: 600.0,
             previous: [Command::IDLE; 2],

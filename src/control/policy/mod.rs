@@ -82,6 +82,7 @@ mod tests {
         let mut seen = Observation {
             time: Time::default(),
             state: State { roll: 0.3, alpha: 0.1, ..State::NEUTRAL },
+            incidence_sd: [0.0; 2],
             actuators: ActuatorState { aileron: 0.2, throttle: 0.4, ..ActuatorState::default() },
             altitude: 600.0,
             previous: [Command::IDLE; 2],

@@ -209,7 +209,7 @@ fn flow(frame: &Telemetry, velocity: [f64; 3]) -> Option<[f64; 2]> {
 
 /// Airspeed (m/s) at which the model has the measured lift at the angle of attack `alpha` (rad). `None` if the lift is too small.
 fn airspeed_by_lift(curve: &LiftCurve, frame: &Telemetry, alpha: f64) -> Option<f64> {
-    let by_pressure = curve.lift(alpha, frame.actuators.elevator);
+    let by_pressure = curve.lift(alpha, frame, frame.state.airspeed.max(SLOWEST_MPS));
     let pressure = -frame.specific_force[2] / by_pressure;
     let enough = by_pressure.abs() > LEAST_LIFT * curve.largest() && pressure > 0.0;
     enough.then(|| (2.0 * pressure / standard_density(frame.altitude)).sqrt())
@@ -354,7 +354,8 @@ mod tests {
             assert!(level.changes().is_empty() && level.error(found).is_finite());
         }
         // an upward gust of 3.5 m/s: vane and lift rise together, attitude and velocity do not
-        let by_pressure = |alpha: f64| level.curve.lift(alpha, level.frame.actuators.elevator);
+        let by_pressure =
+            |alpha: f64| level.curve.lift(alpha, &level.frame, level.frame.state.airspeed);
         let alpha = level.frame.state.alpha;
         let ratio = by_pressure(alpha + 0.175) / by_pressure(alpha);
         let gust = move |frame: &mut Telemetry| {

@@ -5,6 +5,7 @@
 
 use super::lift::LiftCurve;
 use super::polarity::Answers;
+use super::side_force::SideForce;
 use greylag_model::{GreyBox, Trim, TrimError};
 use greylag_physics::airframe::Envelope;
 
@@ -38,6 +39,8 @@ pub struct Config {
     pub answers: Option<Answers>,
     /// Lift of the model, from which the angle of attack for control follows where no vane measures it. `None` without a model.
     pub lift: Option<LiftCurve>,
+    /// Side force of the model, from which the sideslip for control follows where no vane measures it. `None` without a model.
+    pub side_force: Option<SideForce>,
 }
 
 /// Source of the throttle in OFFBOARD (parameter GL_THRUST_SRC).
@@ -80,6 +83,7 @@ impl Config {
         let mut config = Config::new(envelope, speeds.filter_map(|v| row(v).ok()).collect());
         config.answers = Some(Answers::of(model, envelope.airspeed_cruise_mps)?);
         config.lift = LiftCurve::of(model, envelope.airspeed_cruise_mps)?;
+        config.side_force = SideForce::of(model, envelope.airspeed_cruise_mps)?;
         config.check()?;
         Ok(config)
     }
@@ -102,6 +106,7 @@ impl Config {
             trim,
             answers: None,
             lift: None,
+            side_force: None,
         }
     }
 }

@@ -4,7 +4,9 @@
 use std::time::Duration;
 
 use super::air_data::{AirDataCheck, Change};
-use super::lift::LiftCurve;
+use super::config::Config;
+use super::lift::CORRECTED_SD;
+use super::side_force::BySideForce;
 use super::telemetry::{defect, repeats};
 use greylag_link::vehicle::Telemetry;
 use greylag_physics::{State, Time};
@@ -36,18 +38,14 @@ pub(super) struct Estimate {
     fresh_at: Option<Time>,
     frozen: bool,
     air_data: AirDataCheck,
-    /// Angle of attack (rad) and airspeed (m/s) for control in `last`.
-    air: [f64; 2],
+    by_side_force: BySideForce,
+    /// Angle of attack (rad), airspeed (m/s) and sideslip (rad) for control in `last`.
+    air: [f64; 3],
 }
 
 impl Estimate {
-    /// Registers a frame that arrived at `now`, and returns its usability. `curve` is the lift of the model.
-    pub(super) fn take(
-        &mut self,
-        now: Time,
-        frame: &Telemetry,
-        curve: Option<&LiftCurve>,
-    ) -> Frame {
+    /// Registers a frame that arrived at `now`, and returns its usability. `config` has the lift and the side force of the model.
+    pub(super) fn take(&mut self, now: Time, frame: &Telemetry, config: &Config) -> Frame {
         if self.newest.is_some_and(|newest| frame.time <= newest) {
             return Frame::Repeated;
         }
@@ -58,7 +56,9 @@ impl Estimate {
         let frozen = self.last.is_some_and(|last| repeats(frame, &last));
         self.frozen = frozen;
         self.last = Some(*frame);
-        self.air = self.air_data.for_control(curve, frame);
+        let [alpha, airspeed] = self.air_data.for_control(config.lift.as_ref(), frame);
+        let beta = self.by_side_force.sideslip(config.side_force.as_ref(), frame);
+        self.air = [alpha, airspeed, beta];
         self.usable_at = Some(now);
         if frozen {
             return Frame::Frozen;
@@ -95,11 +95,14 @@ impl Estimate {
         self.last.as_ref()
     }
 
-    /// The last frame, with angle of attack and airspeed for control ([`AirDataCheck`]).
+    /// The last frame, with angle of attack and airspeed ([`AirDataCheck`]) and sideslip ([`BySideForce`]) for control.
     pub(super) fn for_control(&self) -> Option<Telemetry> {
-        let [alpha, airspeed] = self.air;
-        let with = |last: Telemetry| State { alpha, airspeed, ..last.state };
-        self.last.map(|last| Telemetry { state: with(last), ..last })
+        let [alpha, airspeed, beta] = self.air;
+        self.last.map(|last| Telemetry {
+            state: State { alpha, airspeed, beta, ..last.state },
+            incidence_sd: std::array::from_fn(|k| last.incidence_sd[k].min(CORRECTED_SD[k])),
+            ..last
+        })
     }
 
     /// Takes the changes in the use of measured air data since the last call.

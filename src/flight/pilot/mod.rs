@@ -28,6 +28,7 @@ mod parameters;
 mod polarity;
 mod polarity_hold;
 mod programme;
+mod side_force;
 mod telemetry;
 mod texts;
 mod wish;
@@ -38,6 +39,7 @@ pub use lift::LiftCurve;
 pub use limits::{Limits, TICK_S};
 pub use modes::mode_name;
 pub use polarity::Answers;
+pub use side_force::SideForce;
 
 use crate::monitor::Monitor;
 use complaints::{Complaints, due};
@@ -250,7 +252,7 @@ impl Pilot {
             self.restart();
         }
         self.advance(now);
-        let quality = self.estimate.take(now, frame, self.config.lift.as_ref());
+        let quality = self.estimate.take(now, frame, &self.config);
         self.report_air_data();
         self.excuse_stillness(quality, now);
         self.answering = frame.time;
@@ -367,13 +369,14 @@ impl Pilot {
         let (wish, throttle) = self.scheduled_wish(frame.time).unwrap_or_else(|| self.wish());
         self.target = self.limits.limit(wish, frame.state.airspeed);
         self.report_limits(&wish);
-        let Telemetry { time, mut state, actuators, altitude, .. } = frame;
+        let Telemetry { time, mut state, incidence_sd, actuators, altitude, .. } = frame;
         // Sensor noise makes an airspeed near zero negative at times.
         state.airspeed = state.airspeed.max(0.0);
         Pending::Fly {
             seen: Observation {
                 time,
                 state,
+                incidence_sd,
                 actuators,
                 altitude,
                 previous: [self.in_force, self.before],

@@ -41,6 +41,7 @@ mod tests {
         let observation = Observation {
             time: Time::default(),
             state: State::NEUTRAL,
+            incidence_sd: [0.0; 2],
             actuators: ActuatorState::default(),
             altitude: 600.0,
             previous: [Command::IDLE; 2],
