@@ -32,7 +32,7 @@ pub struct Observation {
     pub time: Time,
     /// Physical state s^p, eq. (4) of \[GSFM26\].
     pub state: State,
-    /// Standard deviations of the angle of attack and the sideslip in `state`, rad. Zero if they are exact.
+    /// Standard deviations of the angle of attack and the sideslip in `state`, rad. Zero where they are measured or exact.
     pub incidence_sd: [f64; 2],
     /// Observed actuator state z: positions and rates.
     pub actuators: ActuatorState,

@@ -144,7 +144,14 @@ fn limited(personality: Personality, model: Option<&str>, seed: u32) -> Limited 
         bench.desk.pilot().protect_with(EnvelopeLimiter::new(&model));
     }
     bench.run(6.0);
-    bench.engage(0.0, 3.0);
+    // gusts can hide the answer to the pulses of the polarity check
+    for _ in 0..3 {
+        if bench.controller.mode() != Mode::Manual {
+            bench.engage(0.0, 3.0);
+            bench.steer(0.0, 3.0, 4.0);
+        }
+    }
+    let start = bench.seen.len();
     let (mut resting, mut off_deg) = (0, 0.0f64);
     for k in 0..900 {
         let targets = [(0.0, 3.0), (40.0, 5.0), (-40.0, 10.0), (0.0, -10.0), (20.0, 0.0)];
@@ -158,8 +165,8 @@ fn limited(personality: Personality, model: Option<&str>, seed: u32) -> Limited 
             off_deg = off.iter().fold(off_deg, |most, off| most.max(off.abs()));
         }
     }
-    assert!(bench.said("engaged") && !bench.said("hand"), "{:?}", bench.texts());
-    let loads = bench.seen[600..].iter().map(|seen| -seen.truth.specific_force_mps2[2] / 9.81);
+    assert_eq!(bench.controller.mode(), Mode::Manual, "{:?}", bench.texts());
+    let loads = bench.seen[start..].iter().map(|seen| -seen.truth.specific_force_mps2[2] / 9.81);
     Limited {
         resting: resting as f64 / 900.0,
         beyond: loads.clone().filter(|load| *load > 2.2).count() as f64 / loads.len() as f64,
@@ -177,14 +184,14 @@ fn in_turbulence_without_vanes_the_limiter_rests_with_a_wrong_model_only() {
             assert!(exact.resting < 0.01 && wrong.resting > 0.5);
             // what is beyond with the exact model is gusts; the wrong one does not limit
             assert!(exact.beyond < 0.5 * wrong.beyond && exact.load < 2.6);
-            assert!(exact.off_deg < 5.0, "{}", exact.off_deg);
+            assert!(exact.off_deg < 3.0, "{}", exact.off_deg);
         }
     }
 }
 
 /// Prints the figures of `docs/validation/figures.md`.
 #[test]
-#[ignore = "eight minutes"]
+#[ignore = "240 flights"]
 fn in_turbulence_without_vanes_forty_flights_for_each_model() {
     let models = ["jsbsim.toml", "prior.toml", "prior-mild.toml", "prior-severe.toml"];
     let models = models.into_iter().chain(["prior-as-printed.toml"]).map(Some);

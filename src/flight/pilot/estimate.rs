@@ -8,7 +8,7 @@ use super::config::Config;
 use super::lift::CORRECTED_SD;
 use super::side_force::BySideForce;
 use super::telemetry::{defect, repeats};
-use greylag_link::vehicle::Telemetry;
+use greylag_link::vehicle::{Telemetry, VANE_SD};
 use greylag_physics::{State, Time};
 
 /// Largest step back of vehicle time that does not count as a restart of the vehicle. Reordered frames step back by one
@@ -95,12 +95,16 @@ impl Estimate {
         self.last.as_ref()
     }
 
-    /// The last frame, with angle of attack and airspeed ([`AirDataCheck`]) and sideslip ([`BySideForce`]) for control.
+    /// The last frame, with angle of attack and airspeed ([`AirDataCheck`]) and sideslip ([`BySideForce`]) for control. Their
+    /// standard deviations are zero where a vane measures them.
     pub(super) fn for_control(&self) -> Option<Telemetry> {
         let [alpha, airspeed, beta] = self.air;
         self.last.map(|last| Telemetry {
             state: State { alpha, airspeed, beta, ..last.state },
-            incidence_sd: std::array::from_fn(|k| last.incidence_sd[k].min(CORRECTED_SD[k])),
+            incidence_sd: std::array::from_fn(|k| match last.incidence_sd[k] {
+                sd if sd > VANE_SD[k] => sd.min(CORRECTED_SD[k]),
+                _ => 0.0,
+            }),
             ..last
         })
     }

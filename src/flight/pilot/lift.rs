@@ -26,8 +26,6 @@ const TIME_S: f64 = 0.05;
 const FORGOTTEN_S: f64 = 2.0;
 /// Time between two states above which the correction restarts, s.
 const GAP_S: f64 = 0.5;
-/// Largest correction, rad.
-const MOST: f64 = 15.0 * DEGREE;
 /// Standard deviations of the corrected angle of attack and sideslip, rad. With the exact model in light turbulence 0.5° and 0.7°
 /// were measured; the rest allows for a lift and a side force that are wrong by 10 %.
 pub(super) const CORRECTED_SD: [f64; 2] = [0.7 * DEGREE, 1.0 * DEGREE];
@@ -156,7 +154,6 @@ impl Correction {
         } else {
             added -= added * (step / FORGOTTEN_S).min(1.0);
         }
-        let added = added.clamp(-MOST, MOST);
         self.last = Some((time, added));
         estimated + added
     }
