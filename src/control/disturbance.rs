@@ -42,6 +42,11 @@ const BEYOND_FLOW: f64 = 2.0;
 /// Shortest and longest time between two states for a prediction, in steps. Flight controllers send states by their own loop:
 /// ArduPlane at 250 Hz alternates between 8 and 12 ms, a stream of 50 Hz has 20 ms.
 const GAPS: [f64; 2] = [0.3, 3.0];
+/// Largest deviation of the time between two states from its mean, as a fraction of the mean, with which they are used. Around lost
+/// and reordered states the parts of a state are of different times.
+const IRREGULAR: f64 = 0.4;
+/// Averaging time of the time between two states, s.
+const PACE_S: f64 = 0.5;
 /// Prediction error of one step above which the difference is a jump of a sensor and not a motion. In severe turbulence of
 /// MIL-F-8785C (6.4 m/s, 530 m, at 20 m/s) two standard deviations of a step are 0.02 rad of the flow angles and 0.4 m/s. The other
 /// values are far above what forces and moments change in 10 ms: 10 rad/s of attitude and 200 rad/s².
@@ -54,6 +59,8 @@ pub(crate) struct Disturbance {
     /// Time constant of the estimate, s.
     time_constant: f64,
     last: Option<Observation>,
+    /// Mean time between two states, steps.
+    pace: f64,
     memory: Memory,
     /// Memory of the model's input effects and lags. `None` before the first prediction and after a gap: the controls are then
     /// taken to be at rest.
@@ -76,6 +83,7 @@ impl Disturbance {
         Disturbance {
             time_constant,
             last: None,
+            pace: 1.0,
             memory: Memory::default(),
             inputs: None,
             rate: NONE,
@@ -90,15 +98,12 @@ impl Disturbance {
     /// between ticks, and with values that are not finite, the estimates do not change. A jump of a sensor sets the disturbance
     /// to zero.
     pub fn update(&mut self, model: &GreyBox, seen: &Observation) {
-        // time between the two states, in steps
-        let gap = |last: &Observation| seen.time.since(last.time).as_secs_f64() / STEP;
-        let follows = |last: &Observation| (GAPS[0]..=GAPS[1]).contains(&gap(last));
-        let last = self.last.replace(*seen).filter(follows);
-        let Some(last) = last else {
+        let last = self.last.replace(*seen);
+        let Some((last, steps)) = last.and_then(|last| Some((last, self.steps_since(&last)?)))
+        else {
             (self.memory, self.inputs) = (Memory::default(), None);
             return;
         };
-        let steps = gap(&last);
         let figures = &model.airframe.actuators;
         let measured =
             Actuators::from_observed(&last.actuators, &last.previous, figures).controls();
@@ -126,6 +131,17 @@ impl Disturbance {
         } else {
             (self.memory, self.inputs) = (Memory::default(), None);
         }
+    }
+
+    /// Time from `last` to the newest state, in steps. `None` if it is too short, too long or irregular.
+    fn steps_since(&mut self, last: &Observation) -> Option<f64> {
+        let steps = self.last?.time.since(last.time).as_secs_f64() / STEP;
+        if !(GAPS[0]..=GAPS[1]).contains(&steps) {
+            return None;
+        }
+        let regular = (steps - self.pace).abs() <= IRREGULAR * self.pace;
+        self.pace += steps * STEP / PACE_S * (steps - self.pace);
+        regular.then_some(steps)
     }
 
     /// Updates the error statistics with the prediction error `missed` and the measured change `happened` of one step, after the

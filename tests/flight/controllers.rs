@@ -189,7 +189,7 @@ fn in_turbulence_without_vanes_the_limiter_rests_with_a_wrong_model_only() {
     }
 }
 
-/// Prints the figures of `docs/validation/figures.md`.
+/// Prints the table of `results/notes/2026-11-30-angle-of-attack-in-turbulence.md`.
 #[test]
 #[ignore = "240 flights"]
 fn in_turbulence_without_vanes_forty_flights_for_each_model() {

@@ -217,6 +217,9 @@ fn is_replayed_and_drawn_without_options(folder: &Path) {
     assert!(page.contains("lqi") && page.contains("prior-severe-learned"));
     let again = greylag(&["report"]);
     assert!(String::from_utf8_lossy(&again.stderr).contains("--force"));
+    let recording = folder.join("flights/0001/flight.csv");
+    let over = greylag(&["report", "--force", "--out", recording.to_str().unwrap()]);
+    assert!(String::from_utf8_lossy(&over.stderr).contains("would be lost"));
 }
 
 #[test]

@@ -12,7 +12,6 @@ use super::lift::{ByLift, LiftCurve, SLOWEST_MPS};
 use greylag_link::vehicle::{Faults, Telemetry, VANE_SD};
 use greylag_physics::Time;
 use greylag_physics::atmosphere::standard_density;
-use greylag_physics::rigid_body::horizon_to_body;
 
 /// Least disagreement for which an angle of attack is refused, rad. It exceeds the error of a lift curve that is wrong by 30 %.
 const ALPHA_LIMIT: f64 = 5.0 * std::f64::consts::PI / 180.0;
@@ -81,7 +80,7 @@ pub(super) struct AirDataCheck {
     airspeed: Check,
     changes: Vec<Change>,
     velocity: GroundVelocity,
-    /// The last airspeed for control, m/s.
+    /// The last airspeed for control, or for forces without a vane, m/s.
     last_airspeed: f64,
 }
 
@@ -138,14 +137,15 @@ impl AirDataCheck {
         let measured = [frame.state.alpha, frame.state.airspeed];
         let Some(curve) = curve else { return measured };
         if frame.incidence_sd[0] > VANE_SD[0] {
-            return [self.by_lift.alpha(curve, frame, measured[0], measured[1]), measured[1]];
+            let airspeed = self.for_forces(frame);
+            return [self.by_lift.alpha(curve, frame, measured[0], airspeed), measured[1]];
         }
         if frame.faults.contains(Faults::SPECIFIC_FORCE) {
             *self =
                 AirDataCheck { changes: std::mem::take(&mut self.changes), ..Default::default() };
             return measured;
         }
-        let Some(flow) = self.velocity.at(frame).and_then(|velocity| flow(frame, velocity)) else {
+        let Some(flow) = self.velocity.flow(frame) else {
             let alpha = self.reference.alpha(curve, frame, measured[0], self.last_airspeed);
             return [
                 if self.alpha.refused { alpha } else { measured[0] },
@@ -189,22 +189,24 @@ impl AirDataCheck {
         answer
     }
 
+    /// Airspeed (m/s) for the dynamic pressure of a vehicle without vanes. With that of a blocked tube, lift and side force would
+    /// give wrong angles.
+    fn for_forces(&mut self, frame: &Telemetry) -> f64 {
+        let whole = !frame.faults.contains(Faults::SPECIFIC_FORCE);
+        let other = whole.then(|| self.velocity.instead(frame)).flatten();
+        self.last_airspeed = other.unwrap_or(frame.state.airspeed);
+        self.last_airspeed
+    }
+
+    /// Airspeed (m/s) of the last frame's dynamic pressure.
+    pub(super) fn last_airspeed(&self) -> f64 {
+        self.last_airspeed
+    }
+
     /// Takes the changes since the last call.
     pub(super) fn take_changes(&mut self) -> Vec<Change> {
         std::mem::take(&mut self.changes)
     }
-}
-
-/// Angle of attack (rad) and airspeed (m/s) from attitude, `velocity` over ground (NED, m/s) and wind. `None` if one of them is
-/// missing or the airspeed is low.
-fn flow(frame: &Telemetry, velocity: [f64; 3]) -> Option<[f64; 2]> {
-    let [north, east, down] = [0, 1, 2].map(|i| velocity[i] - frame.wind[i]);
-    let (sin, cos) = frame.yaw.sin_cos();
-    let ahead = [cos * north + sin * east, cos * east - sin * north, down];
-    let [u, v, w] = horizon_to_body(&frame.state, ahead);
-    let airspeed = (u * u + v * v + w * w).sqrt();
-    // also false for NaN
-    (airspeed > SLOWEST_MPS).then(|| [w.atan2(u), airspeed])
 }
 
 /// Airspeed (m/s) at which the model has the measured lift at the angle of attack `alpha` (rad). `None` if the lift is too small.
@@ -265,8 +267,9 @@ mod tests {
                 self.k += 1;
                 let mut frame =
                     Telemetry { time: Time::from_micros(10_000 * self.k), ..self.frame };
-                // ten new velocities a second
+                // ten new velocities a second, and a new force in each state
                 frame.velocity[0] += 1e-9 * (self.k / 10) as f64;
+                frame.specific_force[2] += 1e-9 * self.k as f64;
                 change(&mut frame);
                 answer = self.check.for_control(Some(&self.curve), &frame);
             }

@@ -57,7 +57,9 @@ impl Estimate {
         self.frozen = frozen;
         self.last = Some(*frame);
         let [alpha, airspeed] = self.air_data.for_control(config.lift.as_ref(), frame);
-        let beta = self.by_side_force.sideslip(config.side_force.as_ref(), frame);
+        let pressure_airspeed = self.air_data.last_airspeed();
+        let beta =
+            self.by_side_force.sideslip(config.side_force.as_ref(), frame, pressure_airspeed);
         self.air = [alpha, airspeed, beta];
         self.usable_at = Some(now);
         if frozen {

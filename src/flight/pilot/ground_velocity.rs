@@ -1,15 +1,19 @@
 //! Velocity over ground at the time of a state, carried on by the accelerometers between two velocity messages.
 
+use super::lift::SLOWEST_MPS;
 use greylag_link::vehicle::Telemetry;
 use greylag_physics::Time;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
-use greylag_physics::rigid_body::body_to_horizon;
+use greylag_physics::rigid_body::{body_to_horizon, horizon_to_body};
 
 /// Age up to which a velocity over ground is carried on by the accelerometers, s. Velocities come ten times a second, states a
 /// hundred times, and a nose that rises by 60°/s would otherwise look like 6° of angle of attack.
 const CARRIED_S: f64 = 0.5;
 /// An older velocity counts only if the accelerometers say that it has changed by less than this, m/s.
 const UNCHANGED_MPS: f64 = 1.0;
+
+/// Difference of an airspeed from that of velocity and wind with which it is wrong, m/s and as a fraction.
+const WRONG: (f64, f64) = (5.0, 0.3);
 
 /// Velocity over ground between its messages.
 #[derive(Clone, Copy, Debug, Default)]
@@ -19,8 +23,27 @@ pub(super) struct GroundVelocity {
 }
 
 impl GroundVelocity {
+    /// Angle of attack (rad) and airspeed (m/s) of `frame` from attitude, velocity over ground and wind. `None` if one of them is
+    /// missing or the airspeed is low.
+    pub(super) fn flow(&mut self, frame: &Telemetry) -> Option<[f64; 2]> {
+        self.at(frame).and_then(|velocity| flow(frame, velocity))
+    }
+
+    /// Airspeed (m/s) in place of the measured one of `frame`, if that is wrong: by more than [`WRONG`] from the one of velocity and
+    /// wind, or, if no wind is known, below half the speed over ground.
+    pub(super) fn instead(&mut self, frame: &Telemetry) -> Option<f64> {
+        let measured = frame.state.airspeed;
+        let velocity = self.at(frame)?;
+        if let Some([_, airspeed]) = flow(frame, velocity) {
+            let limit = WRONG.0.max(WRONG.1 * measured);
+            return ((airspeed - measured).abs() > limit).then_some(airspeed);
+        }
+        let ground = velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
+        (measured < 0.5 * ground).then_some(ground)
+    }
+
     /// The velocity at the time of `frame`, NED, m/s. `None` if the last one is too old.
-    pub(super) fn at(&mut self, frame: &Telemetry) -> Option<[f64; 3]> {
+    fn at(&mut self, frame: &Telemetry) -> Option<[f64; 3]> {
         let message = frame.velocity;
         let (passed, since, carried) = match self.last {
             Some((before, since, last, carried)) if last == message => {
@@ -40,6 +63,17 @@ impl GroundVelocity {
             (off < UNCHANGED_MPS).then_some(message)
         }
     }
+}
+
+/// As [`GroundVelocity::flow`] with the velocity `velocity` over ground, NED, m/s.
+fn flow(frame: &Telemetry, velocity: [f64; 3]) -> Option<[f64; 2]> {
+    let [north, east, down] = [0, 1, 2].map(|i| velocity[i] - frame.wind[i]);
+    let (sin, cos) = frame.yaw.sin_cos();
+    let ahead = [cos * north + sin * east, cos * east - sin * north, down];
+    let [u, v, w] = horizon_to_body(&frame.state, ahead);
+    let airspeed = (u * u + v * v + w * w).sqrt();
+    // also false for NaN
+    (airspeed > SLOWEST_MPS).then(|| [w.atan2(u), airspeed])
 }
 
 #[cfg(test)]

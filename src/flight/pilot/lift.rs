@@ -131,28 +131,34 @@ impl LiftCurve {
 pub(super) struct Correction {
     /// Time of the last state, and the correction then, rad.
     last: Option<(Time, f64)>,
+    /// Time and value of the last new force, m/s².
+    force: Option<(Time, f64)>,
 }
 
 impl Correction {
-    /// The angle `estimated` (rad) at `time`, corrected by the angle `measured` (rad) with the time constant `time_s` (s).
+    /// The angle `estimated` (rad) at `time`, corrected with the time constant `time_s` (s) by the angle `measured` (rad) that
+    /// follows from the specific force `force` (m/s²). A force that has not changed is an old one, and corrects nothing.
     pub(super) fn corrected(
         &mut self,
         time: Time,
         estimated: f64,
-        measured: Option<f64>,
+        (force, measured): (f64, Option<f64>),
         time_s: f64,
     ) -> f64 {
-        let (mut added, mut step) = (0.0, 0.0);
-        if let Some((before, last)) = self.last {
-            let passed = time.since(before).as_secs_f64();
-            if passed <= GAP_S {
-                (added, step) = (last, passed);
+        let since = |before: Time| time.since(before).as_secs_f64();
+        let last = self.last.filter(|(before, _)| since(*before) <= GAP_S);
+        let mut added = last.map_or(0.0, |(_, added)| added);
+        let step = last.map_or(0.0, |(before, _)| since(before));
+        let is_new = self.force.is_none_or(|(_, last)| last != force);
+        match measured {
+            Some(angle) if is_new => {
+                let passed = self.force.map_or(0.0, |(before, _)| since(before).min(GAP_S));
+                added += (angle - estimated - added) * (passed / time_s).min(1.0);
             }
+            _ => added -= added * (step / FORGOTTEN_S).min(1.0),
         }
-        if let Some(angle) = measured {
-            added += (angle - estimated - added) * (step / time_s).min(1.0);
-        } else {
-            added -= added * (step / FORGOTTEN_S).min(1.0);
+        if is_new {
+            self.force = Some((time, force));
         }
         self.last = Some((time, added));
         estimated + added
@@ -172,7 +178,8 @@ impl ByLift {
         estimated: f64,
         airspeed: f64,
     ) -> f64 {
-        self.0.corrected(frame.time, estimated, curve.measured(frame, airspeed), TIME_S)
+        let lift = (frame.specific_force[2], curve.measured(frame, airspeed));
+        self.0.corrected(frame.time, estimated, lift, TIME_S)
     }
 }
 
@@ -197,7 +204,10 @@ mod tests {
         let altitude = model.airframe.reference.altitude;
         let trim = Trim::straight(model, 20.0, altitude).unwrap();
         let state = State { alpha: truth, airspeed: 20.0, ..State::NEUTRAL };
-        let specific_force = Twin::at_rest(state, &trim.controls, altitude).specific_force(model);
+        let mut specific_force =
+            Twin::at_rest(state, &trim.controls, altitude).specific_force(model);
+        // each state has a new measurement
+        specific_force[2] += 1e-9 * k as f64;
         Telemetry {
             state: State { alpha: estimated, ..state },
             incidence_sd: [0.02; 2],

@@ -64,10 +64,10 @@ impl SideForce {
         Ok((-by_sideslip * pressure >= LEAST).then_some(all))
     }
 
-    /// Sideslip (rad) at which the model has the measured side force of `frame`. `None` without an accelerometer and at a low
-    /// airspeed.
-    fn measured(&self, frame: &Telemetry) -> Option<f64> {
-        let State { airspeed, p, r, .. } = frame.state;
+    /// Sideslip (rad) at which the model has the measured side force of `frame` at the true airspeed `airspeed` (m/s). `None`
+    /// without an accelerometer and at a low airspeed.
+    fn measured(&self, frame: &Telemetry, airspeed: f64) -> Option<f64> {
+        let State { p, r, .. } = frame.state;
         let whole = !frame.faults.contains(Faults::SPECIFIC_FORCE) && airspeed > SLOWEST_MPS;
         let pressure = 0.5 * standard_density(frame.altitude) * airspeed * airspeed;
         let [by_p, by_r] = self.by_rates;
@@ -86,12 +86,19 @@ impl SideForce {
 pub(super) struct BySideForce(Correction);
 
 impl BySideForce {
-    /// Sideslip (rad) for control in `frame`: that of the frame if a vane measures it or without `force`.
-    pub(super) fn sideslip(&mut self, force: Option<&SideForce>, frame: &Telemetry) -> f64 {
+    /// Sideslip (rad) for control in `frame` at the true airspeed `airspeed` (m/s): that of the frame if a vane measures it or
+    /// without `force`.
+    pub(super) fn sideslip(
+        &mut self,
+        force: Option<&SideForce>,
+        frame: &Telemetry,
+        airspeed: f64,
+    ) -> f64 {
         let beta = frame.state.beta;
         match force {
             Some(force) if frame.incidence_sd[1] > VANE_SD[1] => {
-                self.0.corrected(frame.time, beta, force.measured(frame), TIME_S)
+                let measured = (frame.specific_force[1], force.measured(frame, airspeed));
+                self.0.corrected(frame.time, beta, measured, TIME_S)
             }
             _ => beta,
         }
@@ -116,7 +123,9 @@ mod tests {
         let trim = Trim::straight(model, 20.0, altitude).unwrap();
         let state = State { beta: truth, p: 0.6, r: -0.3, ..trim.state };
         let controls = Controls { aileron: 0.2, ..trim.controls };
-        let specific_force = Twin::at_rest(state, &controls, altitude).specific_force(model);
+        let mut specific_force = Twin::at_rest(state, &controls, altitude).specific_force(model);
+        // each state has a new measurement
+        specific_force[1] += 1e-9 * k as f64;
         Telemetry {
             state: State { beta: estimated, ..state },
             incidence_sd: [0.02; 2],
@@ -134,16 +143,31 @@ mod tests {
         for truth in [0.1f64, -0.05] {
             let (mut by_force, mut beta) = (BySideForce::default(), 0.0);
             for k in 0..100 {
-                beta = by_force.sideslip(Some(&force), &frame(&model, k, 0.03, truth));
+                beta = by_force.sideslip(Some(&force), &frame(&model, k, 0.03, truth), 20.0);
             }
             assert!((beta - truth).to_degrees().abs() < 0.2, "{truth} {}", beta.to_degrees());
             // without an accelerometer the estimate is believed again
             for k in 100..1100 {
                 let mut blind = frame(&model, k, 0.03, truth);
                 blind.faults.insert(Faults::SPECIFIC_FORCE);
-                beta = by_force.sideslip(Some(&force), &blind);
+                beta = by_force.sideslip(Some(&force), &blind, 20.0);
             }
             assert!((beta - 0.03).to_degrees().abs() < 0.1, "{}", beta.to_degrees());
+        }
+    }
+
+    /// A lossy link repeats the last accelerometer beside new attitudes.
+    #[test]
+    fn an_old_side_force_corrects_nothing() {
+        let model = model();
+        let force = SideForce::of(&model, 20.0).unwrap().unwrap();
+        let mut by_force = BySideForce::default();
+        for k in 0..50 {
+            let old = Telemetry {
+                specific_force: frame(&model, 0, 0.03, 0.1).specific_force,
+                ..frame(&model, k, 0.03, 0.1)
+            };
+            assert_eq!(by_force.sideslip(Some(&force), &old, 20.0), 0.03);
         }
     }
 
@@ -154,9 +178,9 @@ mod tests {
         let mut by_force = BySideForce::default();
         for k in 0..100 {
             let mut seen = frame(&model, k, 0.03, 0.1);
-            assert_eq!(by_force.sideslip(None, &seen), 0.03);
+            assert_eq!(by_force.sideslip(None, &seen, 20.0), 0.03);
             seen.incidence_sd = VANE_SD;
-            assert_eq!(by_force.sideslip(force.as_ref(), &seen), 0.03);
+            assert_eq!(by_force.sideslip(force.as_ref(), &seen, 20.0), 0.03);
         }
     }
 
@@ -167,7 +191,7 @@ mod tests {
         let mut by_force = BySideForce::default();
         for k in 0..50 {
             let bad = Telemetry { specific_force: [f64::NAN; 3], ..frame(&model, k, 0.2, 0.03) };
-            assert_eq!(by_force.sideslip(force.as_ref(), &bad), 0.2);
+            assert_eq!(by_force.sideslip(force.as_ref(), &bad, 20.0), 0.2);
         }
     }
 
