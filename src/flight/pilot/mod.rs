@@ -136,6 +136,7 @@ pub struct Pilot {
 }
 
 /// Result of `observe`, on which `decide` acts.
+#[expect(clippy::large_enum_variant, reason = "a box would allocate memory at every state")]
 #[derive(Clone, Copy, Debug)]
 enum Pending {
     Disarmed,
