@@ -57,7 +57,8 @@ fn steps_of_any_length_count() {
     for gaps_ms in [[8_u64, 12], [20, 20], [4, 4]] {
         let mut disturbance = Disturbance::new(0.2);
         let mut seen = first();
-        for tick in 0..200 {
+        // the pace of the states must be known first
+        for tick in 0..500 {
             disturbance.update(&model, &seen);
             let gap_ms = gaps_ms[tick % 2];
             for _ in 0..gap_ms {

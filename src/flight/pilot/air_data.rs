@@ -5,7 +5,7 @@
 //! while both references lie to the same side of it by more than a limit. One faulty sensor therefore never causes the refusal of
 //! another: a wrong accelerometer leaves the flow references right, a wrong velocity, wind or attitude the lift references. A gust
 //! changes measurement and lift together, and a stall measurement and flow. PX4 and ArduPilot check airspeed sensors similarly
-//! (innovations, load factor); a flight controller without a vane is left to its own checks.
+//! (innovations, load factor). A flight controller without a vane is left to its own checks; only the dynamic pressure is checked.
 
 use super::ground_velocity::GroundVelocity;
 use super::lift::{ByLift, LiftCurve, SLOWEST_MPS};
