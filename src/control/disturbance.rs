@@ -95,7 +95,7 @@ impl Disturbance {
     }
 
     /// Updates the estimates with the difference between `seen` and the model's prediction from the last tick. After a gap
-    /// between ticks, and with values that are not finite, the estimates do not change. A jump of a sensor sets the disturbance
+    /// or an irregular time between ticks, and with values that are not finite, the estimates do not change. A jump of a sensor sets the disturbance
     /// to zero.
     pub fn update(&mut self, model: &GreyBox, seen: &Observation) {
         let last = self.last.replace(*seen);
@@ -179,8 +179,8 @@ impl Disturbance {
     }
 
     /// Whether planning must not use the model. The result is true if two conditions hold: the root-mean-square prediction error
-    /// of the last half second exceeds the fraction `most` of the measured motion, and the error is correlated with the predicted
-    /// change. The second condition excludes gusts, which no model predicts.
+    /// of the last half second, less what inexact flow angles cause, exceeds the fraction `most` of the measured motion, and the
+    /// error is correlated with the predicted change. The second condition excludes gusts, which no model predicts.
     pub fn is_wrong(&self, most: f64) -> bool {
         let missed = (self.missed - BEYOND_FLOW * BEYOND_FLOW * self.flow).max(0.0);
         let part = (missed / (self.happened + CALM * CALM)).sqrt();
@@ -202,6 +202,10 @@ impl Disturbance {
 /// Mean square of the prediction error of p, q, r, α and β, (x_c per second)², that the standard deviations of the flow angles in
 /// `seen` cause.
 fn from_flow(model: &GreyBox, seen: &Observation, controls: &Controls) -> f64 {
+    // without this every planner and simulation would evaluate the model three times more a step
+    if seen.incidence_sd == [0.0; 2] {
+        return 0.0;
+    }
     let scale = model.scale();
     let rate = |state: &State| model.rate(state, controls, seen.altitude);
     let base = rate(&seen.state);

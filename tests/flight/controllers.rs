@@ -127,10 +127,11 @@ struct Limited {
     off_deg: f64,
 }
 
-/// Flies with an LQI of the exact model, whose commands a limiter with `model` limits. `None`: without a limiter.
-fn limited(personality: Personality, model: Option<&str>, seed: u32) -> Limited {
+/// Flies with an LQI of the exact model, whose commands a limiter with `model` limits. `None`: without a limiter. The accelerometer
+/// has white noise with the standard deviation `shaking` (m/s²).
+fn limited(personality: Personality, model: Option<&str>, shaking: f64, seed: u32) -> Limited {
     let mut bench = Bench::new(personality, Surfaces, |options| {
-        options.noise = Noise::REALISTIC;
+        options.noise = Noise { accelerometer_mps2: shaking, ..Noise::REALISTIC };
         options.seed = seed.into();
         options.plant.seed = seed;
         options.plant.air = Air {
@@ -180,7 +181,7 @@ fn in_turbulence_without_vanes_the_limiter_rests_with_a_wrong_model_only() {
     for personality in [Px4, Ardupilot] {
         for seed in [11, 12] {
             let [exact, wrong] = ["jsbsim.toml", "prior-as-printed.toml"]
-                .map(|model| limited(personality, Some(model), seed));
+                .map(|model| limited(personality, Some(model), 0.3, seed));
             assert!(exact.resting < 0.01 && wrong.resting > 0.5);
             // what is beyond with the exact model is gusts; the wrong one does not limit
             assert!(exact.beyond < 0.5 * wrong.beyond && exact.load < 2.6);
@@ -191,17 +192,19 @@ fn in_turbulence_without_vanes_the_limiter_rests_with_a_wrong_model_only() {
 
 /// Prints the table of `results/notes/2026-11-30-angle-of-attack-in-turbulence.md`.
 #[test]
-#[ignore = "240 flights"]
+#[ignore = "320 flights"]
 fn in_turbulence_without_vanes_forty_flights_for_each_model() {
     let models = ["jsbsim.toml", "prior.toml", "prior-mild.toml", "prior-severe.toml"];
-    let models = models.into_iter().chain(["prior-as-printed.toml"]).map(Some);
-    for model in models.chain([None]) {
-        let flights: Vec<Limited> =
-            (0..20).flat_map(|k| [Px4, Ardupilot].map(|it| limited(it, model, 7000 + k))).collect();
+    let models = models.into_iter().chain(["prior-as-printed.toml"]).map(Some).chain([None]);
+    let calm = models.map(|model| (model, 0.3));
+    for (model, shaking) in calm.chain([(Some("jsbsim.toml"), 1.0), (Some("jsbsim.toml"), 3.0)]) {
+        let flights: Vec<Limited> = (0..20)
+            .flat_map(|k| [Px4, Ardupilot].map(|it| limited(it, model, shaking, 7000 + k)))
+            .collect();
         let mean = |of: fn(&Limited) -> f64| flights.iter().map(of).sum::<f64>() / 40.0;
         let most = |of: fn(&Limited) -> f64| flights.iter().map(of).fold(0.0, f64::max);
         println!(
-            "{}: rests {:.1} % (most {:.1}); beyond 2.2 g {:.2} %, {:.2} g at most; off by {:.1} degrees at most, {:.1} in the mean flight",
+            "{}, accelerometer noise {shaking} m/s²: rests {:.1} % (most {:.1}); beyond 2.2 g {:.2} %, {:.2} g at most; off by {:.1} degrees at most, {:.1} in the mean flight",
             model.unwrap_or("no limiter"),
             100.0 * mean(|x| x.resting),
             100.0 * most(|x| x.resting),
